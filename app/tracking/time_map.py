@@ -16,6 +16,8 @@ _SLOWEST, _FASTEST = 0.02, 1.4
 """Speeds of replays that people may mean."""
 _UNSURE = 0.25
 """Standard deviation of a speed, of the live shot's, beyond which it is unknown."""
+_MOST_UNSURE_FRAMES = 4.0
+"""Standard deviation of the live time of the replay's first and last frames, live frames, beyond which it is unknown."""
 _CHANGE = 15.0
 """Sum of squares of residuals, in frames, that a change of the speed has to explain."""
 
@@ -77,7 +79,10 @@ class TimeMap:
 
 
 def fit_map_to_instants(
-    instants: FloatArray, frame_s: float, assumed_speed: float | None = None
+    instants: FloatArray,
+    frame_s: float,
+    assumed_speed: float | None = None,
+    last_s: float | None = None,
 ) -> TimeMap:
     """The map of instants that a person sees in both shots, each to about a live frame.
 
@@ -88,6 +93,8 @@ def fit_map_to_instants(
         instants: Live and replay time of each, seconds, shape (N, 2).
         frame_s: Time between two live frames, seconds: the standard deviation of an instant.
         assumed_speed: Speed of the replay while one instant is known; None: that of the live shot.
+        last_s: Replay time of its last frame, seconds after its first one; the live times of both have to be known.
+            None: nobody asks for them.
     """
     if not len(instants):
         return TimeMap("No instant is linked yet.", by_hand=True)
@@ -121,11 +128,29 @@ def fit_map_to_instants(
         else:
             continue
         return TimeMap(reason, by_hand=True)
+    unsure = None if last_s is None else _explain_unsure_end(pieces, last_s, frame_s)
     if len(pieces) == 1:
-        return pieces[0]
+        if unsure is None:
+            return pieces[0]
+        speed = round(pieces[0].speed or 1.0, 3) if assumed_speed is None else assumed_speed
+        return replace(_make_map_with_assumed_speed(rows, speed, unsure), too_close=True)
+    if unsure is not None:
+        return TimeMap(f"{unsure}.", by_hand=True)
     changes = " and ".join(f"{piece.first:.2f} s" for piece in pieces[1:])
     reason = f"One offset and speed do not fit the whole replay: they change near {changes}."
     return TimeMap(reason, by_hand=True, pieces=tuple(pieces))
+
+
+def _explain_unsure_end(pieces: list[TimeMap], last_s: float, frame_s: float) -> str | None:
+    """Why the live times of the first and last frames of a replay are not known; None where they are."""
+    ends = (("start", pieces[0], 0.0), ("end", pieces[-1], last_s))
+    sigma, name = max((piece.sigma_at(time) or 0.0, name) for name, piece, time in ends)
+    if sigma <= _MOST_UNSURE_FRAMES * frame_s:
+        return None
+    return (
+        f"The instants are too close together: the {name} of the replay is known to ± {sigma:.2g} s only; link one "
+        f"farther away, near that {name}"
+    )
 
 
 def _make_map_with_assumed_speed(

@@ -202,6 +202,7 @@ def _find_linked_views(
         if not asked:
             continue
         index = read_index(store.settings, replay.sha256)
+        times = index.seconds - index.seconds[link.replay.first]
         same = find_linked_frames(store, link)
         frames = {number: same.replay[number - same.first] for number in asked}
         tracked = read_cameras_of_frames(
@@ -213,7 +214,7 @@ def _find_linked_views(
                 continue
             told = {
                 "link": link.id,
-                "sigma_s": link.map.sigma_s,
+                "sigma_s": link.map.sigma_at(float(times[frame]), float(times[link.replay.last])),
                 "live_frame": number,
                 "off_s": same.off_s[number - same.first],
                 "repeated": frame in same.repeated,

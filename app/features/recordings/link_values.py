@@ -132,6 +132,19 @@ class LinkTimeMap:
         )
         return TimeMap(None, self.offset_s, self.speed, pieces=pieces).to_live_times(times)
 
+    def sigma_at(self, time: float, last: float) -> float | None:
+        """Standard deviation of the live time of a time of the replay, seconds; None where it is not known.
+
+        Args:
+            time, last: Of a frame and of the last frame of the replay, seconds after its first one.
+        """
+        offset, speed, at_middle = self.offset_sigma_s, self.speed_sigma, self.sigma_s
+        if offset is None or speed is None or at_middle is None or last <= 0:
+            return at_middle
+        middle = last / 2
+        both = (at_middle**2 - offset**2 - (speed * middle) ** 2) / (2 * middle)
+        return float(np.sqrt(max(offset**2 + 2 * both * time + (speed * time) ** 2, 0.0)))
+
 
 @dataclass(frozen=True)
 class ShotLink:

@@ -44,6 +44,29 @@ class TestMapOfInstants:
         assert "too close together to tell the speed (3 ± 1.4)" in (made.reason or "")
         assert "0.5 is assumed" in (made.reason or "")
 
+    def test_two_that_do_not_tell_the_time_of_an_end_are_too_close_together(self) -> None:
+        # A third of a second apart, one a frame off: the end of a replay of ten seconds is 1.25 s wrong.
+        pairs = np.array([(2.0, 0.0), (2.2, 0.32)])
+        made = fit_map_to_instants(pairs, STEP, None, 10.0)
+        assert (made.too_close, made.by_hand) == (True, True)
+        assert made.reason == (
+            "The instants are too close together: the end of the replay is known to ± 1.7 s only;"
+            " link one farther away, near that end; 0.625 is assumed."
+        )
+        assert fit_map_to_instants(pairs, STEP, 0.5, 10.0).speed == 0.5
+        assert fit_map_to_instants(pairs, STEP, None, 0.5).reason is None
+        farther = np.array([(2.0, 0.0), (6.0, 8.0)])
+        assert fit_map_to_instants(farther, STEP, None, 10.0).reason is None
+
+    def test_the_start_has_to_be_known_too_and_that_of_a_first_piece(self) -> None:
+        late = fit_map_to_instants(np.array([(6.0, 9.0), (6.25, 9.5)]), STEP, None, 10.0)
+        assert "the start of the replay is known to ± 1 s only" in (late.reason or "")
+        times = np.array([3.0, 3.4, 3.8, 4.2, 6.0, 8.0])
+        live = np.where(times < 3.8, 2 + times / 4, 2.95 + (times - 3.8))
+        changed = fit_map_to_instants(np.column_stack([live, times]), STEP, None, 8.0)
+        assert changed.offset is None and not changed.pieces
+        assert "the start of the replay" in (changed.reason or "")
+
     def test_no_replay_is_much_faster_than_what_it_shows(self) -> None:
         made = made_of([(2.0, 0.0), (14.0, 4.0)])
         assert made.speed is None

@@ -148,6 +148,13 @@ class TestSetInstants:
         assert one["outcome"] == close["outcome"] == "offset"
         assert "too close together" in close["reason"]
 
+    def test_two_that_leave_the_end_of_the_replay_unknown_are_not_linked(
+        self, api: Any, link: str
+    ) -> None:
+        found = instants(api, link, (5, 22), (9, 30)).json()["map"]
+        assert (found["outcome"], found["too_close"], found["speed"]) == ("offset", True, 0.5)
+        assert "link one farther away, near that end" in found["reason"]
+
     def test_more_say_by_how_much_each_is_off(self, api: Any, link: str) -> None:
         found = instants(api, link, (0, 20), (5, 30), (11, 40), (15, 50)).json()
         assert found["map"]["pieces"] == []
@@ -326,6 +333,8 @@ class TestLinkedGroups:
         assert (told["name"], told["frame"], told["live_frame"]) == ("final", 33, 10)
         assert told["off_s"] == pytest.approx((4 + 13 / 2.1 - 10) * 0.04)
         assert (told["repeated"], told["blended"]) == (False, False)
+        # Frame 33 lies 13 frames after one instant and 8 before the other, of a live frame of 0.04 s each.
+        assert told["sigma_s"] == pytest.approx(0.04 * np.hypot(8, 13) / 21)
         number = api.get("/api/v1/groups", params={"dataset": "cup"}).json()["items"][1]["id"]
         (_, view) = api.get(f"/api/v1/groups/{number}").json()["views"]
         assert number_of(picture_of(api.get(f"/api/v1/views/{view['id']}/image"))) == 33
