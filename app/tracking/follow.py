@@ -44,6 +44,7 @@ BRIDGED: Outcome = "bridged"
 LOST: Outcome = "lost"
 OUTCOMES = (TRACKED, BRIDGED, LOST)
 NO_CAMERA = "there is no camera to follow"
+UNSOLVED = "the paint cannot be solved"
 MISSING = "a marking that would be seen has no paint"
 
 GRID = (6, 4)
@@ -183,10 +184,16 @@ class CameraFollower:
         self, picture: FramePicture, camera: Camera, covariance: FloatArray | None
     ) -> TrackedFrame:
         """The frame of a frame whose camera is given: drawn onto the paint where that agrees."""
-        snapped = self._snap_camera(
-            picture, camera, covariance, (10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 3.0)
-        )
-        seen = measure_agreement(snapped.camera, picture.field, picture.paint, self.pitch)
+        try:
+            snapped = self._snap_camera(
+                picture, camera, covariance, (10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 3.0)
+            )
+            seen = measure_agreement(snapped.camera, picture.field, picture.paint, self.pitch)
+        except (GeometryError, np.linalg.LinAlgError):
+            alone = TrackedFrame(
+                picture.number, picture.time, BRIDGED, camera, is_key=True, reason=UNSOLVED
+            )
+            return self._remember_frame(replace(alone, covariance=covariance))
         found = TrackedFrame(
             picture.number, picture.time, TRACKED, snapped.camera, snapped, seen, is_key=True
         )  # fmt: skip
@@ -291,7 +298,10 @@ class CameraFollower:
         if match is None:
             return replace(nothing, reason="the background cannot be followed: a cut, or a blur")
         half = picture.reading.half_diagonal
-        camera, _ = apply_background_motion(last.camera, match, half)
+        try:
+            camera, _ = apply_background_motion(last.camera, match, half)
+        except (GeometryError, np.linalg.LinAlgError):
+            return replace(nothing, reason="the background cannot be followed")
         unit = max(picture.reading.width / 960, 0.6)
         age = last.age + 1
         predicted = replace(nothing, outcome=BRIDGED, camera=camera, age=age)
@@ -313,7 +323,7 @@ class CameraFollower:
         off: a camera may have kept to paint that it met by chance.
         """
         best: TrackedFrame | None = None
-        best_score, best_why = -1.0, "the paint cannot be solved"
+        best_score, best_why = -1.0, UNSOLVED
         told: str | None = best_why
         for reach in REACHES:
             known = predicted_covariance(picture, camera, reach, unit, 1 + self.frames_since_paint)

@@ -13,6 +13,7 @@ from itertools import islice
 
 import numpy as np
 
+from app.errors import GeometryError
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.paint.candidates import MAIN, WIDE
@@ -314,9 +315,12 @@ def _is_at_key_frame_position(
     if frame.camera is None:
         return False
     picture = make_frame_picture(next(clip.frames(frame.number, frame.number + 1)))
-    snapped = snap_to_prepared_picture(
-        picture.reading, frame.camera, pitch, WINDOWS, policy, circles_count_twice=True
-    )
+    try:
+        snapped = snap_to_prepared_picture(
+            picture.reading, frame.camera, pitch, WINDOWS, policy, circles_count_twice=True
+        )
+    except (GeometryError, np.linalg.LinAlgError):
+        return False
     if snapped.reason is not None or not _shows_same_grass(snapped.camera, frame.camera, 0):
         return False
     away = [float(np.linalg.norm(snapped.camera.position - key.position)) for key in keys]
@@ -331,7 +335,10 @@ def _propagate_camera(
     for match in matches:
         if camera is not None and match is not None:
             half = float(np.hypot(*camera.principal_point))
-            camera, _ = apply_background_motion(camera, match, half)
+            try:
+                camera, _ = apply_background_motion(camera, match, half)
+            except (GeometryError, np.linalg.LinAlgError):
+                camera = None
         else:
             camera = None
         cameras.append(camera)

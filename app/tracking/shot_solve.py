@@ -23,6 +23,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from app.errors import GeometryError
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.geometry.resection import (
@@ -229,11 +230,15 @@ class _ShotProblem:
 
     def _measure_turn(
         self, place: int, match: BackgroundMatches | None
-    ) -> tuple[FloatArray, FloatArray]:
-        """How the camera turned and zoomed to the next frame, shape (4,), and its information."""
+    ) -> tuple[FloatArray, FloatArray] | None:
+        """How the camera turned and zoomed to the next frame, shape (4,), and its information; None where the
+        background does not tell it."""
         assert match is not None
         camera = self.camera(place)
-        after, apart = apply_background_motion(camera, match, self.half_diagonal)
+        try:
+            after, apart = apply_background_motion(camera, match, self.half_diagonal)
+        except (GeometryError, np.linalg.LinAlgError):
+            return None
         turned = parameters_from_camera(after, self.half_diagonal) - self.parameters[place]
         turned[PAN] = (turned[PAN] + np.pi) % (2 * np.pi) - np.pi
         points = camera.position + FAR_M * camera.rays(match.here)

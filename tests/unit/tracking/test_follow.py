@@ -17,6 +17,8 @@ from app.soccer.policy import CalibrationPolicy
 from app.tracking import follow
 from app.tracking.clip import ClipFrame
 from app.tracking.follow import (
+    BRIDGED,
+    LOST,
     PATCHY_EVERY,
     PATCHY_LEAST_OFTEN,
     PROPOSED_EVERY,
@@ -56,6 +58,35 @@ def test_another_camera_is_looked_for_ever_more_rarely_while_that_is_in_vain(
     # A picture that has nothing to do with the one before is another matter.
     follower.step(replace(black, number=FRAMES), None)
     assert follower.patchy_every == PATCHY_EVERY
+
+
+class TestFramesThatCannotBeSolved:
+    """One frame whose equations are singular does not end the tracking of its shot."""
+
+    CAMERA = render_film(1).cameras[0]
+
+    @staticmethod
+    def singular(*_: object, **__: object) -> None:
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    def test_a_given_camera_stays_without_its_paint(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(follow, "snap_to_prepared_picture", self.singular)
+        follower = CameraFollower(Pitch(), CalibrationPolicy())
+        found = follower.start(picture(0), self.CAMERA, np.eye(8))
+        assert (found.outcome, found.camera, found.is_key) == (BRIDGED, self.CAMERA, True)
+        assert found.reason == "the paint cannot be solved" and found.covariance is not None
+        assert follower.last is found
+
+    def test_a_background_that_tells_no_turn_loses_the_frame(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(follow, "apply_background_motion", self.singular)
+        follower = CameraFollower(Pitch(), CalibrationPolicy())
+        follower.last = TrackedFrame(0, 0.0, TRACKED, camera=self.CAMERA)
+        same = np.full((50, 2), 40.0)
+        found = follower._follow_background(picture(1), BackgroundMatches(same, same))
+        assert (found.outcome, found.camera) == (LOST, None)
+        assert found.reason == "the background cannot be followed"
 
 
 class TestWhereOneIsSought:

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from app.geometry.resection import PAN, camera_from_parameters, parameters_from_camera
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
+from app.tracking import shot, shot_solve
 from app.tracking.clip import Clip
 from app.tracking.follow import LOST, TRACKED, TrackedFrame
-from app.tracking.shot import FollowedShot, _follow_run, follow_shot
+from app.tracking.shot import (
+    FollowedShot,
+    _follow_run,
+    _is_at_key_frame_position,
+    _propagate_camera,
+    follow_shot,
+)
 from tests.tripod_films import Film
 
 PITCH, POLICY = Pitch(), CalibrationPolicy()
@@ -43,6 +51,11 @@ def turned(frame: TrackedFrame, clip: Clip) -> TrackedFrame:
     parameters[PAN] += 0.035
     camera = camera_from_parameters(parameters, frame.camera.principal_point, half)
     return replace(frame, camera=camera, seen=replace(frame.seen, supported=0.3), is_key=False)
+
+
+def singular(*_: object, **__: object) -> None:
+    """What the equations of a frame may raise."""
+    raise np.linalg.LinAlgError("Singular matrix")
 
 
 def off_px(film: Film, clip: Clip, frame: TrackedFrame) -> float:
@@ -85,3 +98,27 @@ def test_an_annotated_frame_never_gives_way(followed: tuple[Clip, FollowedShot])
     shot.frames[RUN.stop] = key
     _follow_run(clip, shot, RUN, PITCH, POLICY)
     assert shot.frames[RUN.stop] is key
+
+
+def test_a_frame_whose_paint_cannot_be_solved_says_nothing_of_its_position(
+    followed: tuple[Clip, FollowedShot], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clip, whole = followed
+    frame = whole.frames[0]
+    assert frame.camera is not None
+    asked = clip, frame, [frame.camera], PITCH, POLICY
+    assert _is_at_key_frame_position(*asked)
+
+    monkeypatch.setattr(shot, "snap_to_prepared_picture", singular)
+    assert not _is_at_key_frame_position(*asked)
+
+
+def test_a_background_that_tells_no_turn_carries_no_camera(
+    followed: tuple[Clip, FollowedShot], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clip, whole = followed
+    for module in (shot, shot_solve):
+        monkeypatch.setattr(module, "apply_background_motion", singular)
+    assert _propagate_camera(whole.frames[0].camera, whole.matches[1:3]) == [None, None]
+    solved = shot_solve.solve_shot(whole.frames, whole.matches, clip.work, PITCH, POLICY)
+    assert all(frame.camera is not None for frame in solved.frames)
