@@ -72,7 +72,7 @@ class Shot:
         kind: ``main``, ``replay``, ``closeup`` or ``other``.
         entered_by: ``start``, ``cut``, ``dissolve``, ``wipe`` or ``fade``.
         kept: Whether somebody wants to work on it; None: nobody said.
-        start_s, end_s: When its first and last frames are shown, seconds.
+        start_s, end_s: When its first frame is shown and its last one is over, seconds.
     """
 
     first: int

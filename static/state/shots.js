@@ -1,7 +1,7 @@
 // @ts-check
 /** Shots of a recording as values: what splits, joins and names them. Frames are numbers from 0. */
 
-/** @import {MatchClock, Shot, ShotKind} from '../api/recordings.js' */
+/** @import {MatchClock, Shot, ShotKind, TimedShot} from '../api/recordings.js' */
 
 /** @type {{kind: ShotKind, letter: string, label: string}[]} */
 export const SHOT_KINDS = [
@@ -47,6 +47,17 @@ export function changedAt(shots, index, change) {
 export function everyOf({ first, last }, step) {
 	const by = Math.max(1, Math.round(step));
 	return Array.from({ length: Math.floor((last - first) / by) + 1 }, (_, index) => first + index * by);
+}
+
+/** When a frame is shown, by the times of the shots around it: seconds from a frame. @param {Shot[]} shots @param {number} fps where no shot has times @returns {(frame: number) => number} */
+export function clockOf(shots, fps) {
+	const timed = /** @type {TimedShot[]} */ (shots.filter((shot) => 'start_s' in shot));
+	return (frame) => {
+		const shot = timed[shotAt(timed, frame)];
+		if (!shot) return frame / fps;
+		const step = (shot.end_s - shot.start_s) / (shot.last - shot.first + 1);
+		return Math.max(0, shot.start_s + (frame - shot.first) * step);
+	};
 }
 
 /** Minutes, seconds and the frame within its second: 12:07.03. @param {number} seconds @param {number} fps */

@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
-import { changedAt, clockSeconds, clockText, everyOf, lengthText, matchTime, mergedWithNext, shotAt, splitAt, timecode } from '../../static/state/shots.js';
+import { changedAt, clockOf, clockSeconds, clockText, everyOf, lengthText, matchTime, mergedWithNext, shotAt, splitAt, timecode } from '../../static/state/shots.js';
 
 const shot = (first, last, more = {}) => ({ first, last, kind: 'main', entered_by: 'cut', kept: null, ...more });
 const SHOTS = [shot(0, 9, { entered_by: 'start' }), shot(14, 39, { kind: 'replay', entered_by: 'wipe', kept: true }), shot(40, 59)];
@@ -62,6 +62,16 @@ describe('timecode', () => {
 describe('lengthText', () => {
 	it('says seconds, and minutes of what is longer', () => {
 		assert.deepEqual([0.6, 12.34, 59.9, 59.96, 119.7, 3599].map(lengthText), ['0.6 s', '12.3 s', '59.9 s', '1:00', '2:00', '59:59']);
+	});
+});
+
+describe('clockOf', () => {
+	it('says when a frame is shown by the times of its shot, which ends when its last frame is over', () => {
+		const timed = [{ ...SHOTS[0], start_s: 0, end_s: 0.4 }, { ...SHOTS[1], start_s: 0.56, end_s: 5.76 }, { ...SHOTS[2], start_s: 5.76, end_s: 6.56 }];
+		const seconds = clockOf(timed, 25);
+		assert.deepEqual([0, 9, 12, 14, 39, 40, 59].map((frame) => seconds(frame).toFixed(2)), ['0.00', '0.36', '0.16', '0.56', '5.56', '5.76', '6.52']);
+		assert.equal(clockOf([{ ...shot(3, 3), start_s: 2, end_s: 2.04 }], 25)(3), 2);
+		assert.equal(clockOf(SHOTS, 25)(50), 2);
 	});
 });
 

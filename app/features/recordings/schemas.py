@@ -137,7 +137,7 @@ class ShotDocument(Document, shows=Shot):
     entered_by: ShotStart = Field(description="How it begins.")
     kept: bool | None = Field(description="Whether somebody wants to work on it.")
     start_s: float = Field(description="When its first frame is shown, seconds.")
-    end_s: float = Field(description="When its last frame is shown, seconds.")
+    end_s: float = Field(description="When its last frame is over, seconds.")
 
 
 class ShotList(ListDocument[ShotDocument]):

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 
+import numpy as np
+
 from app.config import Settings
 from app.db.json_columns import parse_json_column
 from app.db.store import Store
@@ -12,6 +14,7 @@ from app.errors import InputError
 from app.features.audit.service import add_audit_event
 from app.features.groups.state import require_etag
 from app.features.recordings.index import detect_shots_in_file, read_frame_times, run_in_worker
+from app.features.recordings.links import compute_frame_interval
 from app.features.recordings.queries import RecordingRow, update_recording
 from app.features.recordings.service import (
     Details,
@@ -49,7 +52,8 @@ class Shot:
 
 @dataclass(frozen=True)
 class RecordingShots:
-    """The shots of a recording in their order; ``times`` are those of their first and last frames."""
+    """The shots of a recording in their order; ``times`` say when the first frame of each is shown and
+    its last one is over."""
 
     recording: Recording
     items: tuple[Shot, ...]
@@ -152,8 +156,9 @@ def _build_recording_shots(settings: Settings, row: RecordingRow) -> RecordingSh
     times: tuple[tuple[float, float], ...] = ()
     if items and recording.sha256 is not None:
         seconds = read_frame_times(settings, recording.sha256)
-        ends = ((float(seconds[shot.first]), float(seconds[shot.last])) for shot in items)
-        times = tuple(ends)
+        # The last frame of all is shown as long as others.
+        ends = np.append(seconds[1:], seconds[-1] + compute_frame_interval(seconds))
+        times = tuple((float(seconds[shot.first]), float(ends[shot.last])) for shot in items)
     return RecordingShots(recording, items, times, _make_shots_etag(row))
 
 

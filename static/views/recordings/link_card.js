@@ -9,7 +9,7 @@ import { useAttempt } from '../../lib/attempt.js';
 import { plural } from '../../lib/format.js';
 import { useResource } from '../../lib/resource.js';
 import { navigate } from '../../lib/router.js';
-import { kindOf, timecode } from '../../state/shots.js';
+import { clockOf, kindOf, timecode } from '../../state/shots.js';
 import { FormError } from '../form_error.js';
 
 /** @import {LinkedShot, LinkJson, RecordingJson, Shot} from '../../api/recordings.js' */
@@ -38,6 +38,7 @@ function Suggestions({ one, shots, shot }) {
 	}
 	const items = (found.value?.items ?? []).filter((item) => item.link === null);
 	const others = shots.map((live, index) => ({ live, index })).filter(({ live }) => live !== shot);
+	const seconds = clockOf(shots, one.fps ?? 25);
 	const chosen = others.find(({ index }) => String(index) === other)?.live;
 	return html`
 		<h3>Link to the live shot</h3>
@@ -47,7 +48,7 @@ function Suggestions({ one, shots, shot }) {
 		<ul class="linking__choices">
 			${items.map((item) => html`
 				<li key=${`${item.recording}-${item.first}`}>
-					<button class="button button--small" type="button" data-needs="annotate" data-of=${one.dataset} onClick=${() => link(item)}>Link<span class="hidden-text"> to ${item.name}</span> ${timecode(item.first / (one.fps ?? 25), one.fps ?? 25)}</button>
+					<button class="button button--small" type="button" data-needs="annotate" data-of=${one.dataset} onClick=${() => link(item)}>Link<span class="hidden-text"> to ${item.name}</span> ${timecode(item.recording === one.id ? seconds(item.first) : item.first / (one.fps ?? 25), one.fps ?? 25)}</button>
 					<small>${item.why}</small>
 				</li>`)}
 		</ul>
@@ -55,7 +56,7 @@ function Suggestions({ one, shots, shot }) {
 			<label class="hidden-text" for="link-other">Another live shot</label>
 			<select class="field" id="link-other" value=${other} onChange=${(/** @type {Event} */ event) => setOther(/** @type {HTMLSelectElement} */ (event.target).value)}>
 				<option value="">Another shot…</option>
-				${others.map(({ live, index }) => html`<option key=${index} value=${String(index)}>Shot ${index + 1}: ${kindOf(live.kind).label}, ${timecode(live.first / (one.fps ?? 25), one.fps ?? 25)}</option>`)}
+				${others.map(({ live, index }) => html`<option key=${index} value=${String(index)}>Shot ${index + 1}: ${kindOf(live.kind).label}, ${timecode(seconds(live.first), one.fps ?? 25)}</option>`)}
 			</select>
 			<button class="button button--small" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${!chosen} title=${chosen ? '' : 'Choose a shot first'} onClick=${() => { if (chosen) link({ recording: one.id, first: chosen.first, last: chosen.last }); }}>Link</button>
 		</div>

@@ -5,7 +5,7 @@ import { html } from 'htm/preact';
 import { useSignalEffect } from '@preact/signals';
 import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks';
 
-import { deleteLink, getLink, getLinkedFrames, getRecording, putInstants } from '../../api/recordings.js';
+import { deleteLink, getLink, getLinkedFrames, getRecording, getShots, putInstants } from '../../api/recordings.js';
 import { ApiError } from '../../api/problem.js';
 import { useAttempt } from '../../lib/attempt.js';
 import { useKeys, useSize } from '../../lib/hooks.js';
@@ -14,7 +14,7 @@ import { navigate, page } from '../../lib/router.js';
 import { instantBeside, markOf, replayFrameAt, withInstant } from '../../state/links.js';
 import { announce, complain } from '../../state/notice.js';
 import { makePlayer } from '../../state/playback.js';
-import { matchTime, timecode } from '../../state/shots.js';
+import { clockOf, matchTime, timecode } from '../../state/shots.js';
 import { FormError } from '../form_error.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
 import { BallCard } from './link_ball.js';
@@ -79,6 +79,8 @@ function Stage({ side, shot, player, one, focused, focus, mark }) {
 	useLayoutEffect(() => { if (size.width) player.showAt(size.width * Math.min(devicePixelRatio, 2)); }, [size.width]);
 	const { frame, address } = player.seen.value;
 	const [wanted, fps] = [player.wanted.value, one.fps ?? 25];
+	const shots = useResource((signal) => getShots(one.id, signal), [one.id]).value?.items ?? [];
+	const seconds = clockOf(shots, fps);
 	const name = NAMES[side];
 	return html`
 		<section class="linking__side" aria-label=${name} data-focused=${focused} data-frame=${frame} onPointerDown=${focus} onFocusIn=${focus}>
@@ -86,12 +88,12 @@ function Stage({ side, shot, player, one, focused, focus, mark }) {
 			<div class="film__picture" ref=${ref} style=${{ aspectRatio: `${one.width ?? 16} / ${one.height ?? 9}` }}>${address ? html`<img src=${address} alt=${`Frame ${frame} of ${shot.name}`} />` : null}</div>
 			<input
 				type="range" class="linking__slider" aria-label=${`${name} frame`} min=${shot.first} max=${shot.last} step="1" value=${wanted}
-				aria-valuetext=${`frame ${wanted}, ${timecode(wanted / fps, fps)}`}
+				aria-valuetext=${`frame ${wanted}, ${timecode(seconds(wanted), fps)}`}
 				onInput=${(/** @type {Event} */ event) => { player.stand(); player.goTo(Number(/** @type {HTMLInputElement} */ (event.target).value)); }}
 			/>
 			<p class="film__time">
-				<strong class="mono">${timecode(wanted / fps, fps)}</strong>
-				${one.clocks.length ? html`<span>${matchTime(one.clocks, (at) => at / fps, wanted)}</span>` : null}
+				<strong class="mono">${timecode(seconds(wanted), fps)}</strong>
+				${one.clocks.length ? html`<span>${matchTime(one.clocks, seconds, wanted)}</span>` : null}
 				<span>frame ${wanted}</span>
 				${player.speed.value ? html`<span>${player.speed.value} ×</span>` : null}
 				${mark ? html`<span class="linking__mark">${mark}</span>` : null}

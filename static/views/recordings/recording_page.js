@@ -11,7 +11,7 @@ import { useResource } from '../../lib/resource.js';
 import { announce } from '../../state/notice.js';
 import { goTo, openFilm, playTrouble, seen, showAt, speed, toggleRunning, wanted } from '../../state/playback.js';
 import { makeShotList } from '../../state/shot_list.js';
-import { matchTime, shotAt, timecode } from '../../state/shots.js';
+import { clockOf, matchTime, shotAt, timecode } from '../../state/shots.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
 import { useEnded, useRunningJobs } from '../running_jobs.js';
 import { BallCard, BallOverlay } from './ball_card.js';
@@ -27,7 +27,7 @@ import { FindAgain, ShotCard } from './shot_card.js';
 import { Strip } from './strip.js';
 import { factsOf } from './recordings_page.js';
 
-/** @import {RecordingJson, Shot, TimedShot} from '../../api/recordings.js' */
+/** @import {RecordingJson} from '../../api/recordings.js' */
 /** @import {Balls} from './ball_state.js' */
 /** @import {Cameras} from './camera_state.js' */
 /** @import {RunningJobs} from '../running_jobs.js' */
@@ -70,18 +70,6 @@ function Stage({ one, seconds, cameras, balls }) {
 	`;
 }
 
-/** When a frame is shown, by the times of the shots around it. @param {Shot[]} shots @param {RecordingJson} one */
-function clock(shots, one) {
-	const timed = /** @type {TimedShot[]} */ (shots.filter((shot) => 'start_s' in shot));
-	/** @param {number} frame */
-	return (frame) => {
-		const shot = timed[shotAt(timed, frame)];
-		if (!shot) return frame / (one.fps ?? 25);
-		const step = shot.last > shot.first ? (shot.end_s - shot.start_s) / (shot.last - shot.first) : 1 / (one.fps ?? 25);
-		return Math.max(0, shot.start_s + (frame - shot.first) * step);
-	};
-}
-
 /** @param {{one: RecordingJson, running: RunningJobs, reload: () => void}} props */
 function Film({ one, running, reload }) {
 	const shots = useMemo(() => makeShotList(one.id), [one.id]);
@@ -117,7 +105,7 @@ function Film({ one, running, reload }) {
 	const at = shotAt(list.items, wanted.value);
 	return html`
 		<div class="film">
-			<${Stage} one=${one} seconds=${clock(list.items, one)} cameras=${cameras} balls=${balls} />
+			<${Stage} one=${one} seconds=${clockOf(list.items, one.fps ?? 25)} cameras=${cameras} balls=${balls} />
 			<div class="film__rail">
 				<${ShotCard} one=${one} running=${running} shots=${list.items} at=${at} change=${change} remember=${remember} />
 				<${BallCard} one=${one} shot=${shot} balls=${balls} />

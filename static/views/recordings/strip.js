@@ -6,7 +6,7 @@ import { useEffect, useRef } from 'preact/hooks';
 
 import { frameAddress } from '../../api/recordings.js';
 import { wanted } from '../../state/playback.js';
-import { kindOf, lengthText, timecode } from '../../state/shots.js';
+import { clockOf, kindOf, lengthText, timecode } from '../../state/shots.js';
 import { BallBand } from './ball_card.js';
 
 /** @import {RecordingJson, Shot} from '../../api/recordings.js' */
@@ -47,7 +47,7 @@ function Bar({ one, shots, chosen, balls, goTo }) {
 	return html`
 		<div
 			class="film__bar" role="slider" tabindex="0" aria-label="Frame" aria-valuemin="0" aria-valuemax=${frames - 1} aria-valuenow=${wanted.value}
-			aria-valuetext=${`frame ${wanted.value}, ${timecode(wanted.value / (one.fps ?? 25), one.fps ?? 25)}`}
+			aria-valuetext=${`frame ${wanted.value}, ${timecode(clockOf(shots, one.fps ?? 25)(wanted.value), one.fps ?? 25)}`}
 			onPointerDown=${down} onPointerMove=${move} onPointerUp=${release} onPointerCancel=${release} onKeyDown=${key}
 		>
 			${shots.map((shot) => html`<span key=${shot.first} class="film__stretch" data-kind=${shot.kind} data-dropped=${shot.kept === false} style=${{ left: place(shot.first), width: place(shot.last - shot.first + 1) }}></span>`)}

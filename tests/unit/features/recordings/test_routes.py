@@ -195,8 +195,8 @@ class TestShots:
         assert answer.headers["content-type"].startswith("text/csv")
         assert answer.text.splitlines() == [
             "recording,shot,first,last,start_s,end_s,kind,entered_by,kept",
-            "final,1,0,9,0.0,0.36,main,start,True",
-            "final,2,12,59,0.48,2.36,replay,wipe,",
+            "final,1,0,9,0.0,0.4,main,start,True",
+            "final,2,12,59,0.48,2.4,replay,wipe,",
         ]
 
     @pytest.mark.parametrize("places", [[(5, 4)], [(0, 60)], [(0, 9), (9, 20)], [(10, 20), (0, 5)]])
