@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -193,43 +193,39 @@ def find_last_pitch_changes(session: Session, dataset_id: int) -> dict[str, LogE
     model = GroupModel
     rows = session.execute(select(model.id, model.match).where(model.id.in_(entries)))
     changes = {row.match: entries[row.id] for row in rows}
-    mixed = _list_matches_of_several_sizes_before(session, dataset_id) if changes else set()
-    return {match: entry for match, entry in changes.items() if match not in mixed}
+    return {
+        match: entry
+        for match, entry in changes.items()
+        if _had_one_size_before(session, dataset_id, match, entry.body)
+    }
 
 
-def _list_matches_of_several_sizes_before(session: Session, dataset_id: int) -> set[str]:
-    """Matches whose groups had no one size before the pitch of the match was changed last.
+def _had_one_size_before(
+    session: Session, dataset_id: int, match: str, body: Mapping[str, Any]
+) -> bool:
+    """Whether each group of a match changed as the last one did, or still has the size of before.
 
-    Groups without a match are among them where not all were changed.
+    They need not have changed at once: an import changes one after the other. Those without a match all have to.
     """
-    model, newest = GroupModel, _select_newest_pitch_entries(dataset_id)
-    last = (
-        select(model.match, LogModel.at)
-        .join(LogModel, LogModel.group_id == model.id)
-        .where(LogModel.id.in_(newest))
-        .subquery()
+    model = GroupModel
+    newest = (
+        select(func.max(LogModel.id))
+        .join(model, model.id == LogModel.group_id)
+        .where(LogModel.kind == PITCH, model.dataset_id == dataset_id, model.match == match)
+        .group_by(LogModel.group_id)
     )
-
-    def select_changed(*columns: Any) -> Any:
-        return (
-            select(*columns)
-            .join(model, model.id == LogModel.group_id)
-            .join(last, and_(last.c.match == model.match, last.c.at == LogModel.at))
-            .where(LogModel.kind == PITCH, model.dataset_id == dataset_id)
-        )
-
-    before: dict[str, set[tuple[float, float]]] = {}
-    for match, body in session.execute(select_changed(model.match, LogModel.body).distinct()):
-        size = decompress_json(body)["inverse"]
-        before.setdefault(match, set()).add((size["length"], size["width"]))
-    others = select(model.match, model.pitch_length, model.pitch_width).where(
-        model.dataset_id == dataset_id, model.id.not_in(select_changed(LogModel.group_id))
+    statement = (
+        select(LogModel.body, model.pitch_length, model.pitch_width)
+        .select_from(model)
+        .outerjoin(LogModel, and_(LogModel.group_id == model.id, LogModel.id.in_(newest)))
+        .where(model.dataset_id == dataset_id, model.match == match)
     )
-    unchanged = session.execute(others.distinct()).all()
-    for match, *size in unchanged:
-        before.setdefault(match, set()).add((size[0], size[1]))
-    mixed = {match for match, sizes in before.items() if len(sizes) > 1}
-    return mixed | ({""} & {match for match, *_ in unchanged})
+    before = Pitch(body["inverse"]["length"], body["inverse"]["width"])
+    for changed, *size in session.execute(statement.distinct()):
+        same = changed is not None and decompress_json(changed) == body
+        if not same and (not match or Pitch(*size) != before):
+            return False
+    return True
 
 
 def _select_newest_pitch_entries(dataset_id: int) -> Any:

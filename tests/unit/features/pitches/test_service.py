@@ -331,13 +331,15 @@ class TestReadPitches:
             assert (small.pitch, small.mixed) == (wanted, False)
             assert small.previous == (None if wanted == TRUE else TRUE)
             assert right.previous is None
-        with solved.write() as session:
-            set_pitch_of_groups(session, 1, [1], TRUE, "ann")
-        accept(solved, pitch=TRUE)
-        small, _ = read_pitches(solved, "demo").items
-        assert (small.mixed, small.previous) == (False, None)
-        with pytest.raises(InputError, match="no earlier pitch size"):
-            choose_requested_sizes(read_pitches(solved, "demo"), SMALL, size="previous")
+            if wanted == TRUE:
+                with pytest.raises(InputError, match="no earlier pitch size"):
+                    choose_requested_sizes(read_pitches(solved, "demo"), SMALL, size="previous")
+
+    def test_groups_that_changed_alike_one_after_the_other_had_one_size_before(self, solved):
+        for ids in ([1], [2, 3, 4, 5]):
+            with solved.write() as session:
+                set_pitch_of_groups(session, 1, ids, TRUE, "ann")
+            assert read_pitches(solved, "demo").items[0].previous == Pitch()
 
     def test_sizes_that_both_agree_with_the_lines_become_one(self, solved):
         accept(solved)
