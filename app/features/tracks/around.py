@@ -140,9 +140,9 @@ def compute_track_excerpt(store: Store, track_id: int, frame: int | None = None)
         first = max(int(row.first), frame - AROUND - _MARGIN)
         last = min(int(row.last), frame + AROUND + _MARGIN)
         ids = [
-            group.id
-            for group in list_group_keys_of_match(session, head.id, row.match)
-            if (number := parse_frame_number(group.key)) is not None and first <= number <= last
+            identity
+            for identity, key in list_group_keys_of_match(session, head.id, row.match)
+            if (number := parse_frame_number(key)) is not None and first <= number <= last
         ]
         groups = read_groups_by_match(session, head.id, [row.match], ids).get(row.match, [])
         near = map_groups_by_frame(groups, first, last)
