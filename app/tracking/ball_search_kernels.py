@@ -151,6 +151,7 @@ def find_likeliest_modes(
                     missing = NOTHING
                 now = missing != NOTHING and due[k] and strict == 0
                 for way in range(_PER_KNOT if k else 1):
+                    # No kick and no bounce; other cameras may take over.
                     if short and 0 < way < 5:
                         continue
                     event = NOTHING if way == 0 else BOUNCE if way == 4 else KICK

@@ -151,11 +151,11 @@ def solve_run(
         return TrackRun(rows, format_contradiction(f"{wrong:.0%} of the measurements fit no ball"))
     event = history.event.copy()
     used, noise = history.used.copy(), knots.noise
-    unseen, near = _unseen_touch_noise(knots), options.settled_m
+    unseen, settled = _unseen_touch_noise(knots), options.settled_m
     state = np.pad(history.state, ((0, 0), (0, 3)))
     for turn in range(4):
         fitted = fit_ball_path(
-            knots, history.mode, event, used, state, noise, unseen, brief=True, settled_m=near
+            knots, history.mode, event, used, state, noise, unseen, brief=True, settled_m=settled
         )
         state = fitted.state
         scale = _estimate_noise_scale(knots, fitted, used)
@@ -172,7 +172,9 @@ def solve_run(
             event, history = moved[1], replace(history, mode=moved[0])
         if not changed and turn > 0:
             break
-    fitted = fit_ball_path(knots, history.mode, event, used, state, noise, unseen, settled_m=near)
+    fitted = fit_ball_path(
+        knots, history.mode, event, used, state, noise, unseen, settled_m=settled
+    )
     history = replace(history, event=event)
     rows_of = replace(knots, rows=rows[knots.rows])
     return TrackRun(rows, None, part.view_names, rows_of, history, fitted, used, noise)
