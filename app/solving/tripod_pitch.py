@@ -51,7 +51,7 @@ from app.solving.paint_noise import (
     shift_offsets,
 )
 from app.solving.pitch_size import CERTAIN_SIGMAS, LEAST_DIFFERENCE_M, UNKNOWN_SIGMA_M
-from app.solving.resect import ResectionProblem
+from app.solving.resect import REFERENCE_DIAGONAL, ResectionProblem
 
 LEAST_FRAMES, MOST_FRAMES = 3, 24
 """Two frames tell no tripod; more than so many, evenly over a shot, say little more."""
@@ -59,6 +59,9 @@ DEVIATION_M = 0.3
 """Standard deviation of a frame's position from its tripod: a lens turns before the head."""
 FARTHEST_M = 4 * DEVIATION_M
 """Frames that lie farther from their tripod stand on none, or show other markings than it was thought."""
+BESIDE_PX, BESIDE, TRAVELS = 0.15, 1.5, 0.1
+"""A camera left its paint where that is this much farther from it than it was, pixels at 960 x 540, and so many times as
+far; and the share of the frames with such cameras from which on they stand on no tripod."""
 KAPPA_DEVIATION, KAPPA_SLOPE_SIGMA = 0.002, 0.03
 """Of the distortion from what the zoom says, and of its slope by the logarithm of the focal length."""
 TOLD_SHARE = 0.8
@@ -255,9 +258,12 @@ def find_tripod_pitch(
         return None
     places = np.linspace(0, len(frames) - 1, min(len(frames), MOST_FRAMES)).round().astype(int)
     together = _TripodProblem([frames[place] for place in places], size, pitch, policy)
+    alone = together.measure_errors_px()
     try:
         found = together.minimize_cost()
     except np.linalg.LinAlgError:
+        return None
+    if do_cameras_travel(together.measure_errors_px(), alone, size):
         return None
     away = np.linalg.norm(together.parameters[:, X : Z + 1] - found.tripod_position, axis=1)
     sizes = np.array([found.pitch.length, found.pitch.width])
@@ -266,6 +272,19 @@ def find_tripod_pitch(
     if not (np.isfinite(found.covariance).all() and away.max() < FARTHEST_M and inside.all()):
         return None
     return found
+
+
+def do_cameras_travel(errors_px: FloatArray, alone_px: FloatArray, size: ImageSize) -> bool:
+    """Whether frames stand on no tripod: on one, too many of their cameras leave the paint on which they lay.
+
+    Args:
+        errors_px: Median distance of the paint of each frame from its markings, by cameras on one tripod, shape (N,).
+        alone_px: The same by its camera alone, shape (N,).
+        size: Of the pictures, pixels.
+    """
+    farther = alone_px + BESIDE_PX * size.diagonal / REFERENCE_DIAGONAL
+    beside = errors_px > np.maximum(BESIDE * alone_px, farther)
+    return bool(beside.sum() > TRAVELS * len(beside))
 
 
 @dataclass(frozen=True)
@@ -321,6 +340,11 @@ class _TripodProblem:
         )
         shift = compute_paint_shift(self._grass[at], seen.marking, known.terms, known.pitch)
         return replace(seen, offsets=shift_offsets(seen.offsets, seen.jacobian, shift))
+
+    def measure_errors_px(self) -> FloatArray:
+        """Median distance of the paint of each frame from its markings, pixels, shape (N,)."""
+        offsets = [self.measure_frame_offsets(at).offsets for at in range(len(self._frames))]
+        return np.array([np.median(np.abs(each)) for each in offsets])
 
     def build_normal_equations(self) -> _NormalEquations:
         """The equations where frames and what they share are now."""

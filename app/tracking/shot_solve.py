@@ -8,6 +8,10 @@ Between neighbours the background says how the camera turned and zoomed.
 The normal equations are those of ``shot_equations``. Covariances come from the same
 factors; what no pitch has as planned (``solving.paint_noise``) all frames have in common.
 
+A camera that travels (on a rail, on a cable, in a hand) stands on no tripod: on one it would lie beside the
+paint on which it was followed. Its positions change from frame to frame instead, and a frame whose camera lies
+beside its paint all the same keeps the one with which it was followed.
+
 Where the shot shows its pitch (``solving.tripod_pitch``) it is solved twice: on the plan, whose markings then
 lie on the paint, and on that pitch. How far both cameras of a frame are apart is the uncertainty of the first.
 
@@ -59,6 +63,7 @@ from app.solving.tripod_pitch import (
     KAPPA_SLOPE_SIGMA,
     FrameWithPaint,
     TripodPitch,
+    do_cameras_travel,
     find_tripod_pitch,
     project_paint_to_grass,
     second_moment_about_plan,
@@ -73,6 +78,8 @@ FLOW_PX, FLOW_PLACES = 0.3, 4.0
 """Of what the background says of a turn, pixels at 960 wide, at so many places."""
 UNTIED_SIGMA = 1.0
 """Of a step of a frame that nothing else says anything of, radians."""
+STEP_M = 0.3
+"""By which the position of a camera that travels changes from frame to frame: 7 metres a second at 25 frames."""
 ROUNDS, SETTLED_PX = 8, 0.02
 LEAST_FRAMES = 3
 
@@ -116,6 +123,9 @@ def solve_shot(
     painted = shot.sightings_by_place()
     shown = find_tripod_pitch(list(painted.values()), size, pitch, policy)
     shot.minimize_cost()
+    if shot.does_camera_travel():
+        shot, shown = shot.without_tripod(), None
+        shot.minimize_cost()
     if shown is None:
         solved = _replace_cameras(frames, chosen, shot, shot.covariances())
         return SolvedShot(solved, None, solved)
@@ -176,12 +186,14 @@ class _ShotProblem:
     ):
         self.half_diagonal, self._size = size.diagonal / 2, size
         self._pitch, self._slope_sigma = pitch, SLOPE_SIGMA
+        self._frames, self._frames_apart, self._has_tripod = frames, np.diff(numbers), True
         first = frames[0].camera
         assert first is not None
         self.principal_point = first.principal_point
         self.parameters = np.array([self._parameters_of_frame(frame) for frame in frames])
         # A turn past half a circle goes on.
         self.parameters[:, PAN] = np.unwrap(self.parameters[:, PAN])
+        self._followed = self.parameters
         self._problem = PaintProblem.of(ResectionProblem.of(size, policy), self.parameters[0], None)
         self._sights = [self._make_frame_sightings(frame) for frame in frames]
         self._shifts: dict[int, FloatArray] = {}
@@ -217,6 +229,14 @@ class _ShotProblem:
         other.shared = np.zeros(SHARED)
         other.shared[:3], other.shared[6] = shown.tripod_position, self.shared[6]
         other.given, other._noise, other._seen_from = {}, 1.0, None
+        return other
+
+    def without_tripod(self) -> _ShotProblem:
+        """The same problem from the cameras that were followed, of a camera that travels."""
+        other = copy(self)
+        other._has_tripod, other.parameters, other._noise = False, self._followed, 1.0
+        other.shared = np.zeros(SHARED)
+        other.shared[6] = np.median(other.parameters[:, KAPPA])
         return other
 
     def _parameters_of_frame(self, frame: TrackedFrame) -> FloatArray:
@@ -296,6 +316,14 @@ class _ShotProblem:
         seen = self._measure_all_offsets()[place]
         return None if seen is None else float(np.median(np.abs(seen.offsets)))
 
+    def does_camera_travel(self) -> bool:
+        """Whether it stands on no tripod: on one it left the paint on which it was followed."""
+        places = list(self.sightings_by_place())
+        errors = np.array([self.error_px(place) for place in places], dtype=float)
+        snapped = [self._frames[place].snapped for place in places]
+        followed = np.array([each.error_px for each in snapped if each is not None])
+        return do_cameras_travel(errors, followed, self._size)
+
     def _build_equations(self) -> ShotEquations:
         count = len(self.parameters)
         equations = ShotEquations(count)
@@ -306,6 +334,8 @@ class _ShotProblem:
                 equations.right[place] += weighted.T @ seen.offsets
             self._add_tripod_equations(equations, place)
         for place, turn in enumerate(self._turns):
+            if not self._has_tripod:
+                self._add_travel_equations(equations, place)
             if turn is not None:
                 self._add_turn_equations(equations, place, *turn)
         self._add_priors(equations)
@@ -324,6 +354,8 @@ class _ShotProblem:
         basis, own = self._shared_parameter_basis(place), [X, X + 1, Z, KAPPA]
         rest = self.parameters[place][own] - basis @ self.shared
         weight = np.array([DEVIATION_M, DEVIATION_M, DEVIATION_M, KAPPA_DEVIATION]) ** -2.0
+        if not self._has_tripod:
+            weight[:3] = 0.0
         equations.diagonal[place][own, own] += weight
         equations.right[place][own] -= weight * rest
         equations.border[place][own] -= weight[:, None] * basis
@@ -333,6 +365,11 @@ class _ShotProblem:
     def _add_turn_equations(
         self, equations: ShotEquations, place: int, turned: FloatArray, information: FloatArray
     ) -> None:
+        if not self._has_tripod:
+            # What is near moves in the picture although nothing turns.
+            focal_px = np.exp(self.parameters[place][LOG_FOCAL])
+            flow_px = FLOW_PX * self._problem.pixels_per_reference_pixel
+            information = information / (1 + (STEP_M / FAR_M * focal_px / flow_px) ** 2)
         rest = turned - (self.parameters[place + 1] - self.parameters[place])[AIM]
         here = np.ix_(AIM, AIM)
         equations.diagonal[place][here] += information
@@ -341,13 +378,26 @@ class _ShotProblem:
         equations.right[place][AIM] -= information @ rest
         equations.right[place + 1][AIM] += information @ rest
 
+    def _add_travel_equations(self, equations: ShotEquations, place: int) -> None:
+        """The position changes little from a frame to the next one."""
+        own = slice(X, Z + 1)
+        information = np.eye(3) / (STEP_M**2 * self._frames_apart[place])
+        pull = information @ (self.parameters[place + 1] - self.parameters[place])[own]
+        equations.diagonal[place][own, own] += information
+        equations.diagonal[place + 1][own, own] += information
+        equations.beside[place][own, own] -= information
+        equations.right[place][own] += pull
+        equations.right[place + 1][own] -= pull
+
     def _add_priors(self, equations: ShotEquations) -> None:
         """What is known of tripods and lenses."""
         sigma = np.full(SHARED, np.inf)
         mean = np.zeros(SHARED)
         sigma[3:6], sigma[7] = self._slope_sigma, KAPPA_SLOPE_SIGMA
         sigma[6], mean[6] = self._policy.distortion_sigma, self._policy.distortion_mean
-        if is_main_position(self.shared[:3]):
+        if not self._has_tripod:
+            sigma[:3] = 1.0
+        elif is_main_position(self.shared[:3]):
             sigma[:3], mean[:3] = MAIN_SIGMA[1:], MAIN_MEAN[1:]
         information = sigma**-2.0
         equations.corner[np.diag_indices(SHARED)] += information

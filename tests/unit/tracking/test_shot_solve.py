@@ -32,21 +32,22 @@ HALF = SMALL.diagonal / 2
 COUNT = 12
 
 
-def posed(number: int) -> Camera:
+def posed(number: int, speed_m: float = 0.0) -> Camera:
     parameters = parameters_from_camera(TRUE, HALF)
+    parameters[X] += speed_m * number
     parameters[PAN] += np.radians(0.4) * number
     parameters[LOG_FOCAL] += 0.004 * number
     return camera_from_parameters(parameters, TRUE.principal_point, HALF)
 
 
 def shot(
-    rng: np.random.Generator, off_m: float
+    rng: np.random.Generator, off_m: float, speed_m: float = 0.0, count: int = COUNT
 ) -> tuple[list[TrackedFrame], list[BackgroundMatches | None]]:
     """Frames whose cameras were found up to metres off, and the paint and background that they saw."""
     frames: list[TrackedFrame] = []
     matches: list[BackgroundMatches | None] = []
-    for number in range(COUNT):
-        truth = posed(number)
+    for number in range(count):
+        truth = posed(number, speed_m)
         parameters = parameters_from_camera(truth, HALF)
         moved = rng.normal(0, off_m, 3)
         parameters[X : Z + 1] += moved
@@ -63,7 +64,8 @@ def shot(
         frames.append(TrackedFrame(number, number / 25, TRACKED, found, snapped))
         if number:
             here = rng.uniform((20, 20), (940, 520), (80, 2))
-            places = TRUE.position + 80 * posed(number - 1).rays(here)
+            before = posed(number - 1, speed_m)
+            places = before.position + 80 * before.rays(here)
             there = truth.project(places) + rng.normal(0, 0.1, (80, 2))
             matches.append(BackgroundMatches(here, there))
         else:
@@ -101,6 +103,35 @@ def test_sigma_holds_what_no_pitch_has_as_planned_and_the_truth():
             posed(number), HALF
         )
         assert (np.abs(rest) < 3 * sigma).all()
+
+
+@pytest.mark.parametrize("speed_m", [0.2, 0.4])
+def test_a_camera_that_travels_stands_on_no_tripod_and_keeps_to_its_paint(speed_m: float):
+    frames, matches = shot(np.random.default_rng(5), 0.1, speed_m, 40)
+    solved = solve_shot(frames, matches, SMALL, Pitch(), CalibrationPolicy())
+    assert solved.shown is None
+    for number, frame in enumerate(solved.frames):
+        truth = posed(number, speed_m)
+        assert frame.camera is not None and frame.covariance is not None
+        assert frame.error_px is not None and frame.error_px < 0.15
+        away = frame.camera.position - truth.position
+        assert np.linalg.norm(away) < 0.4
+        own = frame.covariance[X : Z + 1, X : Z + 1]
+        assert away @ np.linalg.solve(own, away) < 11.3
+
+
+def test_bridged_frames_of_a_camera_that_travels_lie_between_those_beside_them():
+    frames, matches = shot(np.random.default_rng(6), 0.1, 0.3, 40)
+    for number in (20, 21, 22):
+        frames[number] = replace(frames[number], outcome=BRIDGED, snapped=None)
+    solved = solve(frames, matches)
+    for number in (20, 21, 22):
+        camera, own, tracked = (
+            solved[number].camera, solved[number].covariance, solved[10].covariance
+        )  # fmt: skip
+        assert camera is not None and own is not None and tracked is not None
+        assert np.linalg.norm(camera.position - posed(number, 0.3).position) < 0.5
+        assert own[X, X] > tracked[X, X]
 
 
 def test_frames_without_paint_lie_between_those_beside_them_and_lost_ones_stay_lost():
