@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -32,7 +31,7 @@ from app.json_text import json_text as finite_text
 from app.json_text import replace_non_finite
 from app.soccer.frames import Box
 from app.soccer.group import Group, Media, View
-from app.soccer.solution import Ball3D, BallFit, BestBall, Solution, ViewSolution
+from app.soccer.solution import BallFit
 
 
 def import_pyarrow() -> tuple[Any, Any]:
@@ -52,41 +51,6 @@ ROWS = 1024
 """Rows of a row group: a few megabytes in memory."""
 
 TEXT, NUMBER, WHOLE, FLAG, LIST = "string", "double", "int32", "bool", "list"
-
-
-@dataclass(frozen=True)
-class ViewRow:
-    """A view on its way out, and what its columns are made from."""
-
-    record: ExportRecord
-    view: View
-    position: int
-    boxes: str
-    everything: bool
-    provenance: Mapping[str, str | None]
-
-    @cached_property
-    def annotated_values(self) -> dict[str, Any]:
-        """Everything that was said of the view."""
-        return view_to_json(self.view)
-
-    @property
-    def view_solution(self) -> ViewSolution | None:
-        """What was computed for the view."""
-        return self.record.view_solution(self.view)
-
-    @property
-    def camera(self) -> Camera | None:
-        """The camera that counts."""
-        return self.record.camera(self.view)
-
-    @property
-    def view_ball_fit(self) -> BallFit | None:
-        """The 3D ball in the view."""
-        return self.record.ball_fit(self.view, self.everything)
-
-
-Getter = Callable[[ViewRow], Any]
 
 
 def write_parquet(
@@ -114,16 +78,18 @@ def write_parquet(
     """
     pyarrow, parquet = import_pyarrow()
     counts = {"groups": 0, "views": 0, "boxes": 0, "balls": 0}
-    schema = pyarrow.schema([(name, _arrow_type(pyarrow, kind)) for name, kind, _ in COLUMNS])
+    schema = pyarrow.schema([(name, _arrow_type(pyarrow, kind)) for name, kind in COLUMNS.items()])
+    said = {name: (provenance or {}).get(name) for name in PROVENANCE}
+    said["software"] = read_software_version()
     waiting: list[dict[str, Any]] = []
     with parquet.ParquetWriter(root / TABLE, schema, compression="zstd") as writer:
         for record in records:
             counts["groups"] += 1
             for position, view in enumerate(record.group.views):
-                row = ViewRow(record, view, position, boxes, everything, provenance or {})
-                waiting.append(replace_non_finite({name: get(row) for name, _, get in COLUMNS}))
+                row = _make_row(record, view, position, boxes, everything)
+                waiting.append(replace_non_finite(row | said))
                 counts["views"] += 1
-                counts["boxes"] += _choose_exported_box(row) is not None
+                counts["boxes"] += row["box_x"] is not None
                 counts["balls"] += record.has_ball_3d(view)
             if len(waiting) >= ROWS:
                 writer.write_table(pyarrow.Table.from_pylist(waiting, schema))
@@ -143,232 +109,160 @@ def json_text(value: Any) -> str | None:
     return None if value is None else finite_text(value)
 
 
-def _make_camera_getter(get: Callable[[Camera], Any]) -> Getter:
-    return lambda row: None if row.camera is None else get(row.camera)
+def _make_row(
+    record: ExportRecord, view: View, position: int, boxes: str, everything: bool
+) -> dict[str, Any]:
+    """What the columns say of a view; those that are left out have no value."""
+    group, solution = record.group, record.solution
+    solved, camera = record.view_solution(view), record.camera(view)
+    annotated = view_to_json(view)
+    row: dict[str, Any] = {
+        "group": group.key,
+        "view": view.key,
+        "position": position,
+        "match": group.match,
+        "split": record.split_of_view(view),
+        "group_split": group.split,
+        "views": len(group.views),
+        "label": group.label,
+        "pitch_length": float(group.pitch.length),
+        "pitch_width": float(group.pitch.width),
+        "file_name": find_export_frame_name(record, view),
+        "frame_present": view.key in record.frames,
+        "width": view.size.width,
+        "height": view.size.height,
+        "verdict": record.verdict,
+        "reason": record.reason,
+        "given_covariance": annotated.get("given_covariance"),
+        "extras": json_text(view.extras.to_plain_values()),
+    }
+    row |= {name: annotated[name] for name in _ANNOTATED}
+    row |= {name: json_text(annotated.get(name)) for name in _AS_JSON}
+    if view.left_out is not None:
+        row |= {"left_out_reason": view.left_out.reason, "left_out_note": view.left_out.note}
+    if camera is not None:
+        row |= _make_camera_columns(record, view, camera)
+    if solved is not None:
+        fit = solved.calibration
+        row |= {
+            "calibrated_by": fit.source,
+            "line_error_px": fit.error_px,
+            "agreement": fit.agreement,
+        }
+        row |= {"in_valid_pair": solved.included, "view_failed": solved.failed}
+        if fit.jac is not None:
+            row |= dict(zip(("jac_0.5", "jac_1", "jac_2"), map(float, fit.jac), strict=True))
+    if view.ball is not None:
+        row |= _make_box_columns("annotated", view.ball.box)
+        row |= _make_box_columns("box", choose_ball_box(record, view, boxes))
+        if view.ball.center is not None:
+            row["ball_x"], row["ball_y"] = map(float, view.ball.center)
+    if solution is not None:
+        row["group_failed"] = solution.first_failing.name if solution.first_failing else None
+        row["solver_version"] = solution.solver_version
+    return row | _make_ball_3d_columns(record, record.ball_fit(view, everything))
 
 
-def _get_camera_covariance(row: ViewRow) -> list[float] | None:
-    known = row.record.camera_covariance(row.view)
-    if row.camera is None or known is None:
-        return None
-    rows = covariance_to_json(known, row.camera, row.view.size)
-    return [number for each in rows for number in each]
+def _make_camera_columns(record: ExportRecord, view: View, camera: Camera) -> dict[str, Any]:
+    pan, tilt, roll = camera.pan_tilt_roll_degrees
+    known = record.camera_covariance(view)
+    rows = None if known is None else covariance_to_json(known, camera, view.size)
+    return {
+        "pan_degrees": pan,
+        "tilt_degrees": tilt,
+        "roll_degrees": roll,
+        "x_focal_length": float(camera.focal_length[0]),
+        "y_focal_length": float(camera.focal_length[1]),
+        "principal_point": [*map(float, camera.principal_point)],
+        "skew": float(camera.skew),
+        "position_meters": camera.position.tolist(),
+        "rotation_matrix": camera.rotation.ravel().tolist(),
+        "distortion": camera.distortion.tolist(),
+        "lens": camera.lens,
+        "camera_covariance": None if rows is None else [number for each in rows for number in each],
+    }
 
 
-def _make_ball_fit_getter(name: str) -> Getter:
-    return lambda row: None if row.view_ball_fit is None else getattr(row.view_ball_fit, name)
+def _make_box_columns(prefix: str, box: Box | None) -> dict[str, float]:
+    if box is None:
+        return {}
+    return {f"{prefix}_{side}": float(getattr(box, side)) for side in _SIDES}
 
 
-def _make_view_solution_getter(get: Callable[[ViewSolution], Any]) -> Getter:
-    return lambda row: None if row.view_solution is None else get(row.view_solution)
+def _make_ball_3d_columns(record: ExportRecord, fit: BallFit | None) -> dict[str, Any]:
+    """The 3D ball and how a view shows it; nothing where it does not."""
+    if fit is None:
+        return {}
+    row: dict[str, Any] = {name: getattr(fit, name) for name in _OF_BALL_FIT}
+    if fit.reprojected is not None:
+        row["reprojected"] = [float(fit.reprojected.x), float(fit.reprojected.y)]
+    if record.ball_point is not None:
+        row |= dict(zip(_PLACE, map(float, record.ball_point), strict=True))
+    solution = record.solution
+    if solution is None or solution.ball is None:
+        return row
+    ball, mean, best = solution.ball, solution.mean_ball or solution.ball, solution.best_ball
+    covariance, test = ball.covariance, solution.chi_square
+    return row | {
+        "sigma_m": ball.sigma_m,
+        "parallax_degrees": ball.parallax_degrees,
+        "covariance": None if covariance is None else [*map(float, covariance)],
+        "point": solution.point,
+        "mean_sigma_m": mean.sigma_m,
+        "best_sigma_m": None if best is None else best.sigma_m,
+        "p_value": None if test is None else test.p_value,
+    }
 
 
-def _make_ball_3d_coordinate_getter(number: int) -> Getter:
-    def get_coordinate(row: ViewRow) -> float | None:
-        point = row.record.ball_point
-        return None if point is None or row.view_ball_fit is None else float(point[number])
-
-    return get_coordinate
-
-
-def _make_ball_3d_getter(name: str) -> Getter:
-    def get_ball_value(row: ViewRow) -> Any:
-        ball = row.record.solution.ball if row.record.solution else None
-        return None if ball is None or row.view_ball_fit is None else getattr(ball, name)
-
-    return get_ball_value
-
-
-def _make_solution_getter(get: Callable[[Solution], Any]) -> Getter:
-    """Of the solution, in rows that have a 3D ball."""
-
-    def get_solution_value(row: ViewRow) -> Any:
-        solution = row.record.solution
-        return (
-            None
-            if solution is None or _make_ball_3d_getter("point")(row) is None
-            else get(solution)
-        )
-
-    return get_solution_value
-
-
-def _get_ball_sigma(ball: Ball3D | BestBall | None) -> float | None:
-    return None if ball is None else ball.sigma_m
-
-
-def _get_p_value_of_solution(solution: Solution) -> float | None:
-    return None if solution.chi_square is None else solution.chi_square.p_value
-
-
-def _make_box_getter(which: Callable[[ViewRow], Box | None], name: str) -> Getter:
-    def get_side(row: ViewRow) -> float | None:
-        box = which(row)
-        return None if box is None else float(getattr(box, name))
-
-    return get_side
-
-
-def _get_annotated_box(row: ViewRow) -> Box | None:
-    return row.view.ball.box if row.view.ball else None
-
-
-def _choose_exported_box(row: ViewRow) -> Box | None:
-    return choose_ball_box(row.record, row.view, row.boxes) if row.view.ball else None
-
-
-def _make_center_coordinate_getter(axis: int) -> Getter:
-    def get_center_coordinate(row: ViewRow) -> float | None:
-        center = row.view.ball.center if row.view.ball else None
-        return None if center is None else float(center[axis])
-
-    return get_center_coordinate
-
-
-def _make_jac_getter(index: int) -> Getter:
-    def get_jac(row: ViewRow) -> float | None:
-        jac = row.view_solution.calibration.jac if row.view_solution else None
-        return None if jac is None else float(jac[index])
-
-    return get_jac
-
-
-def _find_first_failing_gate(row: ViewRow) -> str | None:
-    gate = row.record.solution.first_failing if row.record.solution else None
-    return None if gate is None else gate.name
-
-
-def _get_reprojected_ball_pixels(row: ViewRow) -> Any:
-    point = row.view_ball_fit.reprojected if row.view_ball_fit else None
-    return None if point is None else [float(point.x), float(point.y)]
-
-
-def _make_annotated_value_getter(name: str) -> Getter:
-    return lambda row: row.annotated_values[name]
-
-
-def _make_view_exclusion_getter(name: str) -> Getter:
-    return lambda row: None if row.view.left_out is None else getattr(row.view.left_out, name)
-
-
-def _make_annotated_json_getter(name: str) -> Getter:
-    return lambda row: json_text(row.annotated_values[name])
-
-
-def _make_optional_annotated_json_getter(name: str) -> Getter:
-    return lambda row: (
-        json_text(row.annotated_values[name]) if name in row.annotated_values else None
-    )
-
-
+_ANNOTATED = ("included", "station", "shared", "flipped", "calibration")
+_AS_JSON = ("lines", "balls", "given", "picture", "proposed")
+_OF_BALL_FIT = (
+    "error_px", "error_percent", "optimized_diameter_px", "optimized_error_m", "size_ratio", "depth_m",
+)  # fmt: skip
+_PLACE = ("ball_3d_x", "ball_3d_y", "ball_3d_z")
 _SIDES = ("x", "y", "width", "height")
 PROVENANCE = ("dataset", "version", "policy", "policy_hash", "date")
 """Columns that are the same in every row of an export."""
 
-COLUMNS: tuple[tuple[str, str, Getter], ...] = (
-    ("group", TEXT, lambda row: row.record.group.key),
-    ("view", TEXT, lambda row: row.view.key),
-    ("position", WHOLE, lambda row: row.position),
-    ("match", TEXT, lambda row: row.record.group.match),
-    ("split", TEXT, lambda row: row.record.split_of_view(row.view)),
-    ("group_split", TEXT, lambda row: row.record.group.split),
-    ("views", WHOLE, lambda row: len(row.record.group.views)),
-    ("label", TEXT, lambda row: row.record.group.label),
-    ("pitch_length", NUMBER, lambda row: float(row.record.group.pitch.length)),
-    ("pitch_width", NUMBER, lambda row: float(row.record.group.pitch.width)),
-    ("file_name", TEXT, lambda row: find_export_frame_name(row.record, row.view)),
-    ("frame_present", FLAG, lambda row: row.view.key in row.record.frames),
-    ("width", WHOLE, lambda row: row.view.size.width),
-    ("height", WHOLE, lambda row: row.view.size.height),
-    ("included", FLAG, _make_annotated_value_getter("included")),
-    ("left_out_reason", TEXT, _make_view_exclusion_getter("reason")),
-    ("left_out_note", TEXT, _make_view_exclusion_getter("note")),
-    ("station", TEXT, _make_annotated_value_getter("station")),
-    ("shared", FLAG, _make_annotated_value_getter("shared")),
-    ("flipped", FLAG, _make_annotated_value_getter("flipped")),
-    ("calibration", TEXT, _make_annotated_value_getter("calibration")),
-    ("calibrated_by", TEXT, _make_view_solution_getter(lambda solved: solved.calibration.source)),
-    ("pan_degrees", NUMBER, _make_camera_getter(lambda camera: camera.pan_tilt_roll_degrees[0])),
-    ("tilt_degrees", NUMBER, _make_camera_getter(lambda camera: camera.pan_tilt_roll_degrees[1])),
-    ("roll_degrees", NUMBER, _make_camera_getter(lambda camera: camera.pan_tilt_roll_degrees[2])),
-    ("x_focal_length", NUMBER, _make_camera_getter(lambda camera: float(camera.focal_length[0]))),
-    ("y_focal_length", NUMBER, _make_camera_getter(lambda camera: float(camera.focal_length[1]))),
-    (
-        "principal_point",
-        LIST,
-        _make_camera_getter(lambda camera: [*map(float, camera.principal_point)]),
-    ),
-    ("skew", NUMBER, _make_camera_getter(lambda camera: float(camera.skew))),
-    ("position_meters", LIST, _make_camera_getter(lambda camera: camera.position.tolist())),
-    ("rotation_matrix", LIST, _make_camera_getter(lambda camera: camera.rotation.ravel().tolist())),
-    ("distortion", LIST, _make_camera_getter(lambda camera: camera.distortion.tolist())),
-    ("lens", TEXT, _make_camera_getter(lambda camera: camera.lens)),
-    ("camera_covariance", LIST, _get_camera_covariance),
-    ("jac_0.5", NUMBER, _make_jac_getter(0)),
-    ("jac_1", NUMBER, _make_jac_getter(1)),
-    ("jac_2", NUMBER, _make_jac_getter(2)),
-    (
-        "line_error_px",
-        NUMBER,
-        _make_view_solution_getter(lambda solved: solved.calibration.error_px),
-    ),
-    ("agreement", NUMBER, _make_view_solution_getter(lambda solved: solved.calibration.agreement)),
-    ("ball_x", NUMBER, _make_center_coordinate_getter(0)),
-    ("ball_y", NUMBER, _make_center_coordinate_getter(1)),
-    *((f"annotated_{side}", NUMBER, _make_box_getter(_get_annotated_box, side)) for side in _SIDES),
-    *((f"box_{side}", NUMBER, _make_box_getter(_choose_exported_box, side)) for side in _SIDES),
-    ("ball_3d_x", NUMBER, _make_ball_3d_coordinate_getter(0)),
-    ("ball_3d_y", NUMBER, _make_ball_3d_coordinate_getter(1)),
-    ("ball_3d_z", NUMBER, _make_ball_3d_coordinate_getter(2)),
-    ("sigma_m", NUMBER, _make_ball_3d_getter("sigma_m")),
-    ("parallax_degrees", NUMBER, _make_ball_3d_getter("parallax_degrees")),
-    ("point", TEXT, _make_solution_getter(lambda solution: solution.point)),
-    (
-        "mean_sigma_m",
-        NUMBER,
-        _make_solution_getter(
-            lambda solution: _get_ball_sigma(solution.mean_ball or solution.ball)
-        ),
-    ),
-    (
-        "best_sigma_m",
-        NUMBER,
-        _make_solution_getter(lambda solution: _get_ball_sigma(solution.best_ball)),
-    ),
-    ("p_value", NUMBER, _make_solution_getter(_get_p_value_of_solution)),
-    ("covariance", LIST, lambda row: _to_float_list(_make_ball_3d_getter("covariance")(row))),
-    ("reprojected", LIST, _get_reprojected_ball_pixels),
-    ("error_px", NUMBER, _make_ball_fit_getter("error_px")),
-    ("error_percent", NUMBER, _make_ball_fit_getter("error_percent")),
-    ("optimized_diameter_px", NUMBER, _make_ball_fit_getter("optimized_diameter_px")),
-    ("optimized_error_m", NUMBER, _make_ball_fit_getter("optimized_error_m")),
-    ("size_ratio", NUMBER, _make_ball_fit_getter("size_ratio")),
-    ("depth_m", NUMBER, _make_ball_fit_getter("depth_m")),
-    ("in_valid_pair", FLAG, _make_view_solution_getter(lambda solved: solved.included)),
-    ("view_failed", TEXT, _make_view_solution_getter(lambda solved: solved.failed)),
-    ("group_failed", TEXT, _find_first_failing_gate),
-    ("verdict", TEXT, lambda row: row.record.verdict),
-    ("reason", TEXT, lambda row: row.record.reason),
-    ("lines", TEXT, _make_annotated_json_getter("lines")),
-    ("balls", TEXT, _make_annotated_json_getter("balls")),
-    ("given", TEXT, _make_annotated_json_getter("given")),
-    ("given_covariance", LIST, lambda row: row.annotated_values.get("given_covariance")),
-    ("picture", TEXT, _make_optional_annotated_json_getter("picture")),
-    ("proposed", TEXT, _make_optional_annotated_json_getter("proposed")),
-    ("extras", TEXT, lambda row: json_text(row.view.extras.to_plain_values())),
-    *((name, TEXT, lambda row, name=name: row.provenance.get(name)) for name in PROVENANCE),
-    ("solver_version", TEXT, lambda row: _solver_version(row)),
-    ("software", TEXT, lambda row: read_software_version()),
-)
-"""Name, type and value of every column; docs/formats.md explains them."""
-
-
-def _to_float_list(values: tuple[float, ...] | None) -> list[float] | None:
-    return None if values is None else [*map(float, values)]
-
-
-def _solver_version(row: ViewRow) -> str | None:
-    return row.record.solution.solver_version if row.record.solution else None
+_COLUMNS = (
+    (TEXT, "group view"),
+    (WHOLE, "position"),
+    (TEXT, "match split group_split"),
+    (WHOLE, "views"),
+    (TEXT, "label"),
+    (NUMBER, "pitch_length pitch_width"),
+    (TEXT, "file_name"),
+    (FLAG, "frame_present"),
+    (WHOLE, "width height"),
+    (FLAG, "included"),
+    (TEXT, "left_out_reason left_out_note station"),
+    (FLAG, "shared flipped"),
+    (TEXT, "calibration calibrated_by"),
+    (NUMBER, "pan_degrees tilt_degrees roll_degrees x_focal_length y_focal_length"),
+    (LIST, "principal_point"),
+    (NUMBER, "skew"),
+    (LIST, "position_meters rotation_matrix distortion"),
+    (TEXT, "lens"),
+    (LIST, "camera_covariance"),
+    (NUMBER,
+     "jac_0.5 jac_1 jac_2 line_error_px agreement ball_x ball_y annotated_x "
+     "annotated_y annotated_width annotated_height box_x box_y box_width box_height "
+     "ball_3d_x ball_3d_y ball_3d_z sigma_m parallax_degrees"),
+    (TEXT, "point"),
+    (NUMBER, "mean_sigma_m best_sigma_m p_value"),
+    (LIST, "covariance reprojected"),
+    (NUMBER,
+     "error_px error_percent optimized_diameter_px optimized_error_m size_ratio "
+     "depth_m"),
+    (FLAG, "in_valid_pair"),
+    (TEXT, "view_failed group_failed verdict reason lines balls given"),
+    (LIST, "given_covariance"),
+    (TEXT,
+     "picture proposed extras dataset version policy policy_hash date solver_version "
+     "software"),
+)  # fmt: skip
+COLUMNS = {name: kind for kind, names in _COLUMNS for name in names.split()}
+"""Name and type of every column, in their order; docs/formats.md explains them."""
 
 
 NEEDED = ("group", "view", "width", "height", "lines", "balls", "given", "extras", "station")

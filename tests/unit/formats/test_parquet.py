@@ -151,8 +151,21 @@ class TestWriteParquet:
     def test_an_export_without_rows_still_has_its_columns(self, tmp_path: Path) -> None:
         write_parquet(tmp_path, [])
         file = pq.ParquetFile(tmp_path / "views.parquet")
-        assert file.schema_arrow.names == [name for name, _, _ in COLUMNS]
+        assert file.schema_arrow.names == list(COLUMNS)
         assert len(set(file.schema_arrow.names)) == len(COLUMNS)
+
+    def test_every_value_of_a_row_has_a_column(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        made: list[dict[str, Any]] = []
+
+        def keep(row: dict[str, Any]) -> dict[str, Any]:
+            made.append(row)
+            return row
+
+        monkeypatch.setattr(parquet, "replace_non_finite", keep)
+        write_parquet(tmp_path, [solved(soccer_group())], everything=True)
+        assert made and not {name for row in made for name in row} - set(COLUMNS)
 
     def test_the_same_records_make_the_same_bytes(
         self, tmp_path: Path, solved: Solved, soccer_group: Make
