@@ -1,4 +1,4 @@
-"""A check: one thing that the doctor looked at, what was found, and how to mend it."""
+"""A check: one thing that the doctor looked at, what was found, and what to do about it."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ class CheckResult:
         name: What was looked at.
         ok: Whether it is as it must be.
         sentence: What was found.
-        mend: What to do; None where nothing is to be done.
+        advice: What to do; None where nothing is to be done.
     """
 
     name: str
     ok: bool
     sentence: str
-    mend: str | None = None
+    advice: str | None = None
 
 
 def summarize_faulty_records(
-    name: str, whole: str, apart: Sequence[str], wrong: str, mend: str
+    name: str, whole: str, apart: Sequence[str], wrong: str, advice: str
 ) -> CheckResult:
     """What came of looking at many records.
 
@@ -37,12 +37,12 @@ def summarize_faulty_records(
         whole: What is said where none is at fault.
         apart: Names of those that are.
         wrong: What is wrong with them.
-        mend: What to do about them.
+        advice: What to do about them.
     """
     if not apart:
         return CheckResult(name, True, whole)
     shown = ", ".join(apart[:SHOWN]) + (" and others" if len(apart) > SHOWN else "")
-    return CheckResult(name, False, f"{len(apart):,} {wrong}: {shown}", mend)
+    return CheckResult(name, False, f"{len(apart):,} {wrong}: {shown}", advice)
 
 
 def format_record_key(key: object) -> str:

@@ -147,7 +147,7 @@ def run_in_worker(
                     _run_work_in_process, *given, on_message=on_message, stop=stop
                 )
         except DamagedError as error:
-            store.note_damage(error)
+            store.record_damage(error)
             raise
     return result
 

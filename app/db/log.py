@@ -64,8 +64,8 @@ class LogModel(Base):
 GENESIS = "0" * 64
 """The hash before the first row."""
 
-DEEDS = ("person", "job", "deed")
-"""Kinds of entries that say who did something, and change nothing that was said."""
+AUDIT_KINDS = ("person", "job", "deed")
+"""Kinds of log entries that are audit events: they record who did something, and change no annotation."""
 _BATCH = 500
 
 

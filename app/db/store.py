@@ -13,7 +13,13 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.exc import TimeoutError as NoConnectionError
 
 from app.config import Settings
-from app.db.dialects.dialect import AGAIN, WRITE, get_dialect, make_engine, translate_storage_errors
+from app.db.dialects.dialect import (
+    ALL_CHANGED,
+    WRITE,
+    get_dialect,
+    make_engine,
+    translate_storage_errors,
+)
 from app.db.home import create_private_file
 from app.db.locks import DatabaseOpenLock
 from app.db.migrate import (
@@ -269,11 +275,11 @@ class Store:
             with translate_storage_errors(self.settings):
                 yield
         except DamagedError as error:
-            self.note_damage(error)
+            self.record_damage(error)
             raise
 
-    def note_damage(self, error: DamagedError) -> None:
-        """Refuse writes from now on: something read was not what was written. The first sign stays."""
+    def record_damage(self, error: DamagedError) -> None:
+        """Refuse writes from now on, because stored data is damaged. The first error stays the reason."""
         self._damage = self._damage or (error.message, error.hint or EXAMINE)
 
     def _require_untruncated_log(self, session: Session) -> None:
@@ -331,7 +337,7 @@ class Store:
                 self.sharing.publish(session, word)
 
     def _receive_notification(self, word: str) -> None:
-        if word in (COMMITTED, AGAIN):
+        if word in (COMMITTED, ALL_CHANGED):
             self.notify_listeners()
 
     def close(self) -> None:

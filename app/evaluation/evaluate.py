@@ -63,7 +63,7 @@ ROWS = (
 
 def make_boxes_table(
     frames: Sequence[GroundTruthFrame],
-    careful: Mapping[int, Box],
+    reference: Mapping[int, Box],
     detections: Mapping[int, Sequence[Detection]],
     resamples: MatchResamples,
     truth: str = "optimized",
@@ -75,16 +75,16 @@ def make_boxes_table(
 
     Args:
         frames: Of the dataset.
-        careful: The reference box by id of the frame.
+        reference: The reference box by id of the frame.
         detections: By id of the frame.
         resamples: For the intervals.
         truth: The kind of box whose overlap a run keeps of each frame (``box_iou``): its row
             opens the frames.
     """
-    compared = _select_comparable_boxes(frames, careful)
+    compared = _select_comparable_boxes(frames, reference)
     rows = [
         _make_box_row(kind, label, [(frame, frame.boxes[kind], box) for frame, box in compared], resamples,
-             len(careful), FrameFieldRange("box_iou") if kind == truth else None)
+             len(reference), FrameFieldRange("box_iou") if kind == truth else None)
         for kind, label in ROWS
     ]  # fmt: skip
     if detections:
@@ -94,10 +94,10 @@ def make_boxes_table(
             if (hit := _find_overlapping_detection(detections, frame, box))
         ]
         rows.append(
-            _make_box_row("detected", "Detected boxes, IoU > 0", found, resamples, len(careful))
+            _make_box_row("detected", "Detected boxes, IoU > 0", found, resamples, len(reference))
         )
     note = (
-        f"{len(compared)} frames that have a reference box and a 3D ball, of {len(careful)} reference "
+        f"{len(compared)} frames that have a reference box and a 3D ball, of {len(reference)} reference "
         f"boxes. Size error is |d - d reference| in per cent of the reference box's diagonal. "
         f"The row of the run's true box opens its frames; the figure of boxes has every frame of "
         f"every row."
@@ -106,18 +106,18 @@ def make_boxes_table(
 
 
 def make_boxes_figure(
-    frames: Sequence[GroundTruthFrame], careful: Mapping[int, Box], distances: Mapping[int, float]
+    frames: Sequence[GroundTruthFrame], reference: Mapping[int, Box], distances: Mapping[int, float]
 ) -> Chart:
     """IoU and size error of each box of each frame, over the distance of the ball.
 
     Args:
         frames: Of the dataset.
-        careful: The reference box by id of the frame.
+        reference: The reference box by id of the frame.
         distances: Camera to ball, metres, by id of the frame; frames without one are left out.
     """
     compared = sorted(
         (distances[frame.id], frame.id, frame, box)
-        for frame, box in _select_comparable_boxes(frames, careful)
+        for frame, box in _select_comparable_boxes(frames, reference)
         if frame.id in distances
     )
     note = f"{plural(len(compared), 'frame')}; a point opens its frame."
@@ -157,12 +157,12 @@ def _make_scatter_series(
 
 
 def _select_comparable_boxes(
-    frames: Sequence[GroundTruthFrame], careful: Mapping[int, Box]
+    frames: Sequence[GroundTruthFrame], reference: Mapping[int, Box]
 ) -> list[tuple[GroundTruthFrame, Box]]:
     return [
-        (frame, careful[frame.id])
+        (frame, reference[frame.id])
         for frame in frames
-        if frame.id in careful and has_every_box(frame)
+        if frame.id in reference and has_every_box(frame)
     ]
 
 
@@ -180,8 +180,8 @@ def _make_box_row(
     behind: FrameFieldRange | None = None,
 ) -> Row:
     matches = [frame.match for frame, _, _ in compared]
-    overlaps = [iou(box, careful) for _, box, careful in compared]
-    errors = [size_error_percent(box, careful) for _, box, careful in compared]
+    overlaps = [iou(box, reference) for _, box, reference in compared]
+    errors = [size_error_percent(box, reference) for _, box, reference in compared]
     cells = (
         resamples.mean_with_interval(overlaps, matches, whole),
         resamples.mean_with_interval(errors, matches, whole),
@@ -190,10 +190,10 @@ def _make_box_row(
 
 
 def _find_overlapping_detection(
-    detections: Mapping[int, Sequence[Detection]], frame: GroundTruthFrame, careful: Box
+    detections: Mapping[int, Sequence[Detection]], frame: GroundTruthFrame, reference: Box
 ) -> Box | None:
     found = sorted(detections.get(frame.id, ()), key=lambda item: -item.score)
-    return next((item.box for item in found if iou(item.box, careful) > 0), None)
+    return next((item.box for item in found if iou(item.box, reference) > 0), None)
 
 
 @dataclass(frozen=True)
@@ -223,12 +223,12 @@ class EvaluationInputs:
 
     Attributes:
         detections: None where nobody predicted balls at all.
-        careful: Boxes that somebody drew with care, or None.
+        reference: Boxes that somebody drew with care, or None.
         cameras: Predicted cameras at the annotated size, or None.
     """
 
     detections: Mapping[int, Sequence[Detection]] | None = None
-    careful: Mapping[int, Box] | None = None
+    reference: Mapping[int, Box] | None = None
     cameras: Mapping[int, Camera] | None = field(default=None)
 
 
@@ -259,16 +259,16 @@ def evaluate(
     if inputs.detections is not None:
         tables += list(_make_detection_and_localization_tables(judged, results, inputs, resamples))
         figures += list(_make_detection_figures(judged, results, inputs))
-    if inputs.careful is not None:
+    if inputs.reference is not None:
         tables.append(
             make_boxes_table(
-                frames, inputs.careful, inputs.detections or {}, resamples, options.boxes
+                frames, inputs.reference, inputs.detections or {}, resamples, options.boxes
             )
         )
         distances = {
             item.frame_id: item.distance_m for item in results if item.distance_m is not None
         }
-        figures.append(make_boxes_figure(frames, inputs.careful, distances))
+        figures.append(make_boxes_figure(frames, inputs.reference, distances))
     if scores is not None:
         rows = [
             ("predicted", "Predicted cameras", scores[0]),
@@ -311,14 +311,14 @@ def _measure_frames(
     scores: tuple[Scores, Scores] | None,
     options: EvaluationOptions,
 ) -> list[FrameResult]:
-    cameras, careful = inputs.cameras or {}, inputs.careful or {}
+    cameras, reference = inputs.cameras or {}, inputs.reference or {}
     results = []
     for item in judged:
         frame = item.frame
         result = make_frame_result(
             item, options.ball_diameter_m, cameras.get(frame.id), options.min_score
         )
-        box = careful.get(frame.id)
+        box = reference.get(frame.id)
         results.append(
             replace(
                 result,
@@ -394,6 +394,6 @@ def _count_denominators(
         "detections_not_judged": sum(
             len(found) for frame, found in detections.items() if frame not in inside
         ),
-        "careful_boxes": len(inputs.careful or {}),
+        "careful_boxes": len(inputs.reference or {}),
         "predicted_cameras": len(inputs.cameras or {}),
     }

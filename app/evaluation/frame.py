@@ -36,14 +36,18 @@ def iou(a: Box, b: Box) -> float:
     return shared / (a.width * a.height + b.width * b.height - shared)
 
 
-def size_error_percent(box: Box, careful: Box) -> float:
-    """|d - d_careful| in per cent of the reference box's diagonal, d = (width + height) / 2.
+def size_error_percent(box: Box, reference: Box) -> float:
+    """|d - d_reference| in per cent of the reference box's diagonal, d = (width + height) / 2.
 
     Example:
         >>> size_error_percent(Box(0, 0, 6, 8), Box(0, 0, 3, 4))
         70.0
     """
-    return 100.0 * abs(box.diameter - careful.diameter) / math.hypot(careful.width, careful.height)
+    return (
+        100.0
+        * abs(box.diameter - reference.diameter)
+        / math.hypot(reference.width, reference.height)
+    )
 
 
 @dataclass(frozen=True)

@@ -264,7 +264,7 @@ class FrameResult:
         predicted_error_m: As ``error_m`` with the predicted camera; likewise the two after it.
         predicted_jac: JaC of the predicted camera at 0.5 % of the diagonal; 0 where there are
             annotated lines and no camera.
-        box_iou: Overlap of the true box with the careful one; only where the frame has every kind
+        box_iou: Overlap of the true box with the reference box; only where the frame has every kind
             of box, as in the table of boxes.
     """
 

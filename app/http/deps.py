@@ -44,7 +44,7 @@ from app.features.tracks.jobs import TRACKS
 from app.features.tracks.link_ball import register_link_by_ball_jobs
 from app.features.versions.jobs import register_version_jobs
 from app.features.webhooks.sender import WebhookSender
-from app.features.what_if.service import YieldStore
+from app.features.what_if.service import WhatIfStore
 from app.features.what_if.statistics import StatisticsCache
 from app.http.access import (
     get_current_login,
@@ -119,7 +119,7 @@ class Services:
     exports: ExportFolder
     jobs: Jobs
     events: EventPublisher
-    yields: YieldStore
+    yields: WhatIfStore
     statistics: StatisticsCache
     noises: NoiseCache
     upkeep: UpkeepScheduler
@@ -150,7 +150,7 @@ class Services:
             exports,
             jobs,
             EventPublisher(store, jobs),
-            YieldStore(store),
+            WhatIfStore(store),
             StatisticsCache(store),
             NoiseCache(store),
             UpkeepScheduler(store, jobs),

@@ -169,7 +169,7 @@ async def _handle_review_error(request: Request, error: Exception) -> Response:
     if isinstance(error, StaleStateError):
         headers["ETag"], current = error.etag, error.current
     if isinstance(error, DamagedError):
-        request.app.state.services.store.note_damage(error)
+        request.app.state.services.store.record_damage(error)
     # Of what is only too much at once the line of its request is enough: there may be thousands.
     is_only_much = isinstance(error, OverloadedError) and error.__cause__ is None
     if status >= 500 and not is_only_much:

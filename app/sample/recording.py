@@ -128,7 +128,7 @@ class _FilmedShot:
         """Which picture a frame shows; between two there is a share."""
         return (frame - self.begin) * self.part.speed * self.rate / FPS
 
-    def shown(self, frame: int) -> tuple[float, bool]:
+    def picture_of_frame(self, frame: int) -> tuple[float, bool]:
         """Which picture a frame shows in truth, and whether it mixes the two beside it."""
         wanted = self.picture_number_of(frame)
         whole = abs(wanted - round(wanted)) < 1e-6
@@ -315,7 +315,7 @@ class _ShotRenderer:
 
     def frame(self, number: int) -> Image:
         """What the video shows of it."""
-        picture, is_mix = self.shot.shown(number)
+        picture, is_mix = self.shot.picture_of_frame(number)
         low = math.floor(picture)
         if not is_mix:
             return self._add_caption(self._render_picture(low), picture)
@@ -432,14 +432,14 @@ def _recording_truth_to_json(play: Play, shots: list[_FilmedShot], since: float)
 
 
 def _frame_truth_to_json(play: Play, shot: _FilmedShot, frame: int) -> dict[str, Any]:
-    picture, is_mix = shot.shown(frame)
+    picture, is_mix = shot.picture_of_frame(frame)
     low = math.floor(picture)
     seconds = max(shot.seconds(picture), 0.0)
     camera, instant = shot.camera(low), play.instant_at(seconds)
     pixel = camera.project(instant.ball[None])[0]
     depth = float(camera.pitch_to_camera(instant.ball[None])[0, 2])
     in_view = bool(is_inside_image(pixel[None])[0]) and depth > 0
-    before = shot.shown(frame - 1)
+    before = shot.picture_of_frame(frame - 1)
     return {
         "frame": frame,
         "shot": shot.number,

@@ -73,10 +73,10 @@ def group_sigma_widening(found: ChiSquare | None) -> float:
     return float(sigma_widening(*numbers)[0])
 
 
-def chi_square_residuals(
+def fit_balls_and_test_residuals(
     facts: GroupFacts, used: BoolArray, start: FloatArray, policy: Policy
 ) -> ChiSquareResiduals:
-    """Fit one ball to all clicks of each group, and test what is left.
+    """Fit one ball to all clicks of each group, and test the residuals.
 
     A click's uncertainty is that of the hand and of its camera, as for every sigma. Lenses
     are linear around the click, which is exact to a thousandth of the residual.
@@ -96,10 +96,10 @@ def chi_square_residuals(
 def compute_leave_one_out_chi_square(
     facts: GroupFacts, used: BoolArray, start: FloatArray, policy: Policy
 ) -> ChiSquareResiduals:
-    """``chi_square_residuals`` one group without one of its views, a row for each that counts, in order.
+    """The residuals of one group without one of its views: a row for each view that counts, in order.
 
     Args:
-        facts: Of the one group; the rest as for ``chi_square_residuals``.
+        facts: Of the one group; the rest as for ``fit_balls_and_test_residuals``.
     """
     places = np.flatnonzero(used)
     rest = ~np.eye(len(places), dtype=bool) & np.isfinite(facts.view_axis[places, 0])
@@ -128,8 +128,8 @@ def _test_residuals(
 
 
 def p_values(facts: GroupFacts, used: BoolArray, start: FloatArray, policy: Policy) -> FloatArray:
-    """p-value of each group as of ``chi_square_residuals``, infinite where it is ``find_untestable_groups``, (G,)."""
-    found = chi_square_residuals(facts, used, start, policy).p_value
+    """p-value of each group, shape (G,); infinite where ``find_untestable_groups`` names it."""
+    found = fit_balls_and_test_residuals(facts, used, start, policy).p_value
     found[find_untestable_groups(facts, used, policy)] = np.inf
     return found
 

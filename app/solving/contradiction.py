@@ -13,9 +13,9 @@ from app.soccer.policy import Policy
 from app.soccer.solution import ChiSquare
 from app.solving.chi_square import (
     LOW_P_VALUE,
-    chi_square_residuals,
     compute_leave_one_out_chi_square,
     find_untestable_groups,
+    fit_balls_and_test_residuals,
     group_sigma_widening,
 )
 from app.solving.facts import GroupFacts
@@ -81,7 +81,7 @@ def compute_chi_square(
         policy: How noisy a click is.
     """
     used = find_views_in_pairs(facts, judgement.valid)
-    found = chi_square_residuals(facts, used, judgement.point, policy)
+    found = fit_balls_and_test_residuals(facts, used, judgement.point, policy)
     if not np.isfinite(found.p_value[0]):
         return None
     return ChiSquare(

@@ -13,7 +13,7 @@ from app.geometry.triangulation import parallax_angle
 from app.soccer.policy import Policy
 from app.soccer.solution import GATES
 from app.solving.ball_covariance import CovarianceOfMeanBall, is_covariance_within, is_sigma_within
-from app.solving.chi_square import chi_square_residuals, p_values
+from app.solving.chi_square import fit_balls_and_test_residuals, p_values
 from app.solving.facts import GroupFacts
 
 MIN_VIEWS = 2
@@ -232,7 +232,7 @@ def widen_covariances(
     wanted = np.zeros(facts.groups, bool)
     wanted[groups] = True
     used = find_views_in_pairs(facts, valid) & wanted[facts.view_group]
-    widening = chi_square_residuals(facts, used, point, policy).widening[groups]
+    widening = fit_balls_and_test_residuals(facts, used, point, policy).widening[groups]
     widened: FloatArray = covariances * (widening**2)[:, None, None]
     return widened
 

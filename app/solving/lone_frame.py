@@ -184,7 +184,7 @@ class _UnknownPitchFit:
             raise np.linalg.LinAlgError("the lines do not determine the camera")
         return LoneFrameUncertainty(
             covariance,
-            self.frame.pitch_at_unknowns(self.unknowns),
+            self.frame.pitch_with_corrections(self.unknowns),
             np.sqrt(np.diag(spread)[SIZES]),
         )
 
@@ -196,8 +196,8 @@ class _UnknownPitchProblem:
     pitch: Pitch
     sigma: FloatArray
 
-    def pitch_at_unknowns(self, unknowns: FloatArray) -> Pitch:
-        """The pitch of some unknowns."""
+    def pitch_with_corrections(self, unknowns: FloatArray) -> Pitch:
+        """The pitch with the length and width corrections (metres) among the unknowns."""
         length, width = unknowns[SIZES].tolist()
         return replace(
             self.pitch, length=self.pitch.length + length, width=self.pitch.width + width
@@ -300,7 +300,7 @@ class _UnknownPitchProblem:
         camera, warp = unknowns[:PARAMETERS], unknowns[WARP]
         seen = undo_warp(self.problem, self.observations, warp)
         seen = Observations(
-            pitch_curves(self.pitch_at_unknowns(unknowns)), seen.pixels, seen.marking
+            pitch_curves(self.pitch_with_corrections(unknowns)), seen.pixels, seen.marking
         )
         half = self.problem.size.diagonal / 2
 

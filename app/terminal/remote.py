@@ -373,7 +373,7 @@ def evaluate_on_server(
     Returns:
         The evaluation, and the sets that were made or found for it.
     """
-    named = {"predictions": request.predictions, "careful": request.careful}
+    named = {"predictions": request.predictions, "careful": request.reference}
     sets = {
         name: _find_or_send_prediction_set(client, dataset, source)
         for name, source in named.items()

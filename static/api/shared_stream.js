@@ -14,7 +14,7 @@
 
 const ADDRESS = '/api/v1/events';
 const NAME = 'touchline-events';
-const AGAIN = 5000;
+const RETRY_MS = 5000;
 
 /**
  * Read the stream until the returned function is called.
@@ -102,7 +102,7 @@ function lead(kinds, reader, moment) {
 		stream.onerror = () => {
 			reader.lost();
 			// The browser tries again by itself, but not after an answer that is no stream.
-			if (stream.readyState === EventSource.CLOSED) retry = setTimeout(open, AGAIN);
+			if (stream.readyState === EventSource.CLOSED) retry = setTimeout(open, RETRY_MS);
 		};
 		for (const kind of kinds) {
 			stream.addEventListener(kind, (event) => reader.told(kind, event.data));

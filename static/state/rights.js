@@ -9,7 +9,7 @@ import { complain } from './notice.js';
 
 /** @import {Action, Role} from '../api/people.js' */
 
-const DEEDS = /** @type {Record<Action, string>} */ ({
+const ACTION_LABELS = /** @type {Record<Action, string>} */ ({
 	account: 'This', read: 'Looking at this', annotate: 'Editing', review: 'Reviewing or exporting',
 	lead: 'This', administer: 'This',
 });
@@ -30,7 +30,7 @@ export function whyNot(action, dataset) {
 	const allows = me.value?.allows;
 	if (role === null || !allows || allows[role]?.includes(action)) return '';
 	const least = Object.keys(allows).find((name) => allows[/** @type {Role} */ (name)].includes(action));
-	return `${DEEDS[action]} needs the role ${least}${dataset ? ` in ${dataset}` : ''}; yours is ${role}.`;
+	return `${ACTION_LABELS[action]} needs the role ${least}${dataset ? ` in ${dataset}` : ''}; yours is ${role}.`;
 }
 
 /** Say why something is not done. @param {Action} action @param {string} [dataset] @returns {boolean} whether it may not be */

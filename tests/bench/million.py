@@ -22,7 +22,7 @@ from app.db.store import Store
 from app.features.queue.service import find_neighbours, list_groups
 from app.features.queue.statistics import read_statistics
 from app.features.what_if.funnel import count_yield
-from app.features.what_if.service import YieldStore
+from app.features.what_if.service import WhatIfStore
 from app.features.what_if.statistics import StatisticsCache
 from tests.bench.table import print_table
 from tests.e2e.service import run_touchline
@@ -80,9 +80,9 @@ def _measured(home: Path, groups: int) -> tuple[dict[str, float], float]:
 def _yields(store: Store) -> dict[str, float]:
     """Counted once, as a server does after its start; then first and later looks."""
     start = time.perf_counter()
-    YieldStore(store).update_table(1)
+    WhatIfStore(store).update_table(1)
     found = {"yield counted anew": 1000 * (time.perf_counter() - start)}
-    yields = YieldStore(store)
+    yields = WhatIfStore(store)
     start = time.perf_counter()
     count_yield(yields, 1)
     found["first yield after a start"] = 1000 * (time.perf_counter() - start)

@@ -207,7 +207,7 @@ them, the same tables come from `touchline evaluate` on a frozen version:
 touchline import soccernet-v3 SOCCERNET --dataset soccernet && touchline solve --dataset soccernet
 touchline freeze --dataset soccernet --groups passing --name paper
 touchline evaluate --dataset soccernet --version paper --split test yolo-results.json \\
-    --images instances_test.json --careful careful-boxes.csv --cameras pnlcalib-cameras.zip --out results
+    --images instances_test.json --reference reference-boxes.csv --cameras pnlcalib-cameras.zip --out results
 ```""".splitlines()
 
 

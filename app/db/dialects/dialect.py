@@ -36,8 +36,8 @@ from app.errors import EXAMINE, BusyError, DamagedError, InputError, StorageErro
 from app.json_text import json_text
 
 Hearer = Callable[[str], None]
-AGAIN = ""
-"""The word that stands for all that may have been said while nobody could listen."""
+ALL_CHANGED = ""
+"""The notification after a lost connection: anything may have changed meanwhile."""
 
 
 class ProcessCoordinator(Protocol):

@@ -13,7 +13,7 @@ import structlog
 from sqlalchemy import Connection, Engine, text
 from sqlalchemy.exc import DBAPIError
 
-from app.db.dialects.dialect import AGAIN, Hearer
+from app.db.dialects.dialect import ALL_CHANGED, Hearer
 from app.db.session import Session
 from app.errors import StorageError
 
@@ -147,7 +147,7 @@ class PostgreSQLCoordinator:
     def _receive_notifications(self, connection: Connection) -> None:
         try:
             connection.execute(text(f"LISTEN {CHANNEL}"))
-            self._notify_subscribers(AGAIN)
+            self._notify_subscribers(ALL_CHANGED)
             driver: Any = connection.connection.driver_connection
             while not self._closing.is_set():
                 for notice in driver.notifies(timeout=POLL_SECONDS):

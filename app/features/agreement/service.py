@@ -308,7 +308,7 @@ def adopt_and_decide(
     group_id: int,
     batch_id: int | None,
     annotations: Sequence[IndependentAnnotation],
-    taken: IndependentAnnotation,
+    adopted: IndependentAnnotation,
     *,
     outcome: str,
     actor: str,
@@ -319,6 +319,7 @@ def adopt_and_decide(
     """Take one annotation over, and be done with all of them, in one transaction.
 
     Args:
+        adopted: The annotation to adopt.
         judge: ``actor`` judges the group as the annotation's person did.
         found: What the comparison came to, where it is not kept yet.
 
@@ -327,19 +328,19 @@ def adopt_and_decide(
     """
     at = now()
     itself = actor == BY_ITSELF
-    values = {"outcome": outcome, "take_id": taken.id, "decided": at, "decided_by": actor}
+    values = {"outcome": outcome, "take_id": adopted.id, "decided": at, "decided_by": actor}
     body = {
         "did": "agreed" if itself else "decided",
         "outcome": outcome,
-        "take": taken.id,
-        "person": taken.person,
+        "take": adopted.id,
+        "person": adopted.person,
         "of": sorted(annotation.person for annotation in annotations),
     }
     values["state"] = AGREED if itself else DECIDED
 
     def record_decision(session: Session) -> None:
         there = list_annotations_of_group(session, group_id)
-        rest = (annotation for annotation in annotations if annotation.id != taken.id)
+        rest = (annotation for annotation in annotations if annotation.id != adopted.id)
         if any(annotation not in there for annotation in rest):
             raise _make_changed_case_error(group_id)
         if found is not None:
@@ -352,17 +353,17 @@ def adopt_and_decide(
             complete_group_in_batch(session, batch_id, group_id, actor=actor, at=at)
         append_entries(session, [NewLogEntry(KIND, actor, at, body, dataset, group_id)])
         if judge:
-            note = f"as {taken.person} judged it"
-            copy_verdict_to_original(session, taken, actor=actor, note=note)
+            note = f"as {adopted.person} judged it"
+            copy_verdict_to_original(session, adopted, actor=actor, note=note)
 
     return adopt_annotation(
-        store, taken.id, actor=actor, paint=paint, also=record_decision, decided=not itself
+        store, adopted.id, actor=actor, paint=paint, also=record_decision, decided=not itself
     )
 
 
 def adopt_without_case(
     store: Store,
-    taken: IndependentAnnotation,
+    adopted: IndependentAnnotation,
     annotations: Sequence[IndependentAnnotation],
     *,
     actor: str,
@@ -372,7 +373,7 @@ def adopt_without_case(
 
     Args:
         store: The database.
-        taken: The annotation.
+        adopted: The annotation.
         annotations: Those that were submitted of its group in its batch.
         actor: Who decided so.
         paint: Reads the paint of edited lines again.
@@ -382,16 +383,16 @@ def adopt_without_case(
     """
 
     def finish_work(session: Session) -> None:
-        if taken.batch_id is None or find_batch(session, taken.batch_id) is None:
+        if adopted.batch_id is None or find_batch(session, adopted.batch_id) is None:
             return
-        batch, at = read_batch(session, taken.batch_id, with_here=False), now()
+        batch, at = read_batch(session, adopted.batch_id, with_here=False), now()
         if batch.verdicts == 1:
-            let_group_wait_for_reviewer(session, batch, taken, at=at)
+            let_group_wait_for_reviewer(session, batch, adopted, at=at)
             return
         complete_unchosen_annotations(session, [annotation.id for annotation in annotations], at)
-        complete_group_in_batch(session, batch.id, taken.group_id, actor=actor, at=at)
+        complete_group_in_batch(session, batch.id, adopted.group_id, actor=actor, at=at)
 
-    return adopt_annotation(store, taken.id, actor=actor, paint=paint, also=finish_work)
+    return adopt_annotation(store, adopted.id, actor=actor, paint=paint, also=finish_work)
 
 
 def _make_changed_case_error(group_id: int) -> ConflictError:

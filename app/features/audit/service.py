@@ -25,7 +25,7 @@ from app.json_text import Moment
 from app.soccer.actors import LOCAL_USER
 from app.wording import plural
 
-DEED = "deed"
+AUDIT_EVENT = "deed"
 """Kind of the log's entries about what was made, changed or deleted beside the groups."""
 JOB = "job"
 """Kind of the log's entries about jobs that somebody asked for."""
@@ -43,7 +43,9 @@ def add_audit_event(
         dataset_id: Of which dataset; None: of none.
         what: What tells it from others of its kind; nothing secret.
     """
-    append_entries(session, [NewLogEntry(DEED, actor, now(), {"did": did, **what}, dataset_id)])
+    append_entries(
+        session, [NewLogEntry(AUDIT_EVENT, actor, now(), {"did": did, **what}, dataset_id)]
+    )
 
 
 def log_job_request(

@@ -407,12 +407,12 @@ def open_next_group(
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
 def open_group(
-    batch: Id, group: Id, how: LeaseRequest, services: AppServices, members: Members
+    batch: Id, group: Id, body: LeaseRequest, services: AppServices, members: Members
 ) -> Lease:
     """Take a group, or keep it for another three minutes; 409 where somebody has it open."""
     worker = members.member_of_batch(services.store, batch)
-    taken = LeaseService(services.store).lease_group(batch, group, worker, take_over=how.take_over)
-    return _announce_lease(services, taken)
+    lease = LeaseService(services.store).lease_group(batch, group, worker, take_over=body.take_over)
+    return _announce_lease(services, lease)
 
 
 @router.delete(

@@ -121,19 +121,19 @@ class ExportFolder:
         self._write_record(entry)
         return entry
 
-    def find(self, name: str) -> ExportEntry | None:
+    def find_entry(self, export_id: str) -> ExportEntry | None:
         """The finished export of that id, or None."""
-        if not _ID.fullmatch(name) or not self._record_path(name).is_file():
+        if not _ID.fullmatch(export_id) or not self._record_path(export_id).is_file():
             return None
-        return ExportEntry(**json.loads(self._record_path(name).read_bytes()))
+        return ExportEntry(**json.loads(self._record_path(export_id).read_bytes()))
 
-    def get(self, name: str) -> ExportEntry:
+    def get_entry(self, export_id: str) -> ExportEntry:
         """The finished export of that id.
 
         Raises:
             NotFoundError: There is none.
         """
-        entry = self.find(name)
+        entry = self.find_entry(export_id)
         if entry is None:
             raise NotFoundError("there is no such export")
         return entry
@@ -159,7 +159,7 @@ class ExportFolder:
         at, gone = datetime.now(UTC), 0
         for name in [path.stem for path in self.folder.glob("*.json")]:
             try:
-                entry = self.find(name)
+                entry = self.find_entry(name)
             except (ValueError, TypeError):
                 # A record that is none of ours says nothing of its age.
                 entry = None

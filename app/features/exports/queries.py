@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from sqlalchemy import false, func, not_, or_, select
 
-from app.db.log import DEEDS, LogModel
+from app.db.log import AUDIT_KINDS, LogModel
 from app.db.session import Session
 from app.features.queue.queries import GroupListing, RowOrder
 from app.features.queue.tables import QueueModel
 from app.features.solutions.queries import is_group_solved
 
-_NO_WORD = ("freeze", "comment", *DEEDS)
+_NO_WORD = ("freeze", "comment", *AUDIT_KINDS)
 _ACCEPTED = QueueModel.status == "accepted"
 _CURRENT = not_(QueueModel.stale)
 _SOLVED = is_group_solved()

@@ -348,7 +348,7 @@ def get_content(
     through this server, or from an address of the store that is good for a minute.
     """
     document = _export_document(services, export)
-    entry = services.exports.find(document.id) if document.state == "done" else None
+    entry = services.exports.find_entry(document.id) if document.state == "done" else None
     if entry is not None and entry.stored is not None:
         return redirect_or_stream_stored_file(
             services.settings, entry.stored, _file_name(document), request
@@ -392,14 +392,14 @@ def _export_document(services: Services, export: str) -> ExportDocument:
         if job.kind == KIND:
             return ExportDocument.of_job(job, _find_entry_of_job(services, job), days)
         raise NotFoundError("there is no such export")
-    return ExportDocument.of(services.exports.get(export), days)
+    return ExportDocument.of(services.exports.get_entry(export), days)
 
 
 def _find_entry_of_job(services: Services, job: Job) -> ExportEntry | None:
     """What a job left behind; None of another with its id, as there was before a restore."""
     if job.kind != KIND or job.state != DONE or job.result.get("export") != str(job.id):
         return None
-    entry = services.exports.find(str(job.id))
+    entry = services.exports.find_entry(str(job.id))
     same = entry is not None and entry.request["dataset"] == job.request["dataset"]
     return entry if same else None
 

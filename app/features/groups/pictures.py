@@ -118,10 +118,12 @@ def mark_readings_with_stale_people_boxes(
     return given
 
 
-def mark_paint_outdated_where_people_moved(old: Group, new: Group) -> dict[str, PaintReading]:
-    """The readings of a group after others hide paint in some of its views.
+def mark_paint_outdated_where_player_boxes_changed(
+    old: Group, new: Group
+) -> dict[str, PaintReading]:
+    """The paint readings of a group, by view; those of views whose player boxes changed are outdated.
 
-    Those say nothing of any clicks any more: solving goes without them and names the mending.
+    An outdated reading has an empty ``sought_for``: solving does not use it and suggests reading again.
     """
     readings = {}
     for key, reading in old.paint.items():

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import bindparam, delete, func, literal, select, update
 
-from app.db.log import DEEDS, LogModel
+from app.db.log import AUDIT_KINDS, LogModel
 from app.db.session import Session
 from app.features.datasets.tables import (
     DatasetModel,
@@ -377,7 +377,7 @@ def iterate_changes_after_entry(session: Session, after: int) -> Iterator[Stored
     new = (
         LogModel.id > after,
         LogModel.dataset_id.is_not(None),
-        LogModel.kind.not_in(DEEDS),
+        LogModel.kind.not_in(AUDIT_KINDS),
     )
     plain = select(*columns, LogModel.group_id).where(*new)
     of_station = (

@@ -24,7 +24,7 @@ from app.features.findings.queries import (
 )
 from app.features.groups.edit import SetCameraPositions, SetPaintReadings
 from app.features.groups.insert_queries import NewRows
-from app.features.groups.pictures import mark_paint_outdated_where_people_moved
+from app.features.groups.pictures import mark_paint_outdated_where_player_boxes_changed
 from app.features.groups.queries import (
     StoredGroup,
     iterate_unassigned_frames,
@@ -423,7 +423,7 @@ def _update_group(
         shared_here = SetCameraPositions(stored.group.positions).apply(followed.group)
         followed = replace(followed, group=shared_here)
     # What was read of a picture says of which, and is read again where that is another.
-    paint = mark_paint_outdated_where_people_moved(stored.group, followed.group)
+    paint = mark_paint_outdated_where_player_boxes_changed(stored.group, followed.group)
     followed = replace(followed, group=SetPaintReadings(paint).apply(followed.group))
     insert_paint_readings(session, origin.dataset_id, followed.group.paint.values())
     save_reimported_group(

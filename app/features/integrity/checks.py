@@ -173,8 +173,8 @@ def _check_tables_against_log(
 
 def _check_tables(logged: StateSnapshot, present: StateSnapshot, restore: str) -> list[CheckResult]:
     return [
-        compare_with_log(words, getattr(logged, name), getattr(present, name), mend)
-        for names, mend in ((REBUILT, REBUILD), (KEPT, restore))
+        compare_with_log(words, getattr(logged, name), getattr(present, name), advice)
+        for names, advice in ((REBUILT, REBUILD), (KEPT, restore))
         for name, words in names.items()
     ]
 
@@ -197,15 +197,17 @@ def _check_digests(session: Session) -> CheckResult:
     return summarize_faulty_records("digests", whole, apart, "not of what was said", REBUILD)
 
 
-def _check_review_queue(session: Session, mend: str) -> CheckResult:
+def _check_review_queue(session: Session, advice: str) -> CheckResult:
     """Whether the row of each group follows from what was said of it and computed for it."""
     try:
         count, apart = find_outdated_rows(session)
     except StorageError as error:
-        return CheckResult("queue", False, error.message, mend)
+        return CheckResult("queue", False, error.message, advice)
     whole = f"{count:,} rows, as groups, verdicts and solutions say"
     wrong = "not as groups, verdicts and solutions say"
-    return summarize_faulty_records("queue", whole, [str(number) for number in apart], wrong, mend)
+    return summarize_faulty_records(
+        "queue", whole, [str(number) for number in apart], wrong, advice
+    )
 
 
 def _report_unsolved_groups(store: Store) -> list[CheckResult]:
@@ -213,9 +215,9 @@ def _report_unsolved_groups(store: Store) -> list[CheckResult]:
     checks = []
     for item in list_datasets(store):
         waiting = len(list_stale_groups(store, item.id))
-        mend = f'touchline solve --dataset "{item.name}"' if waiting else None
+        advice = f'touchline solve --dataset "{item.name}"' if waiting else None
         sentence = f"{waiting:,} of {item.groups:,} groups wait to be solved"
-        checks.append(CheckResult(f"solutions of {item.name}", True, sentence, mend))
+        checks.append(CheckResult(f"solutions of {item.name}", True, sentence, advice))
     return checks
 
 
@@ -325,7 +327,10 @@ def _check_settings(settings: Settings) -> CheckResult:
 
 def _check_sign_on(settings: Settings) -> CheckResult:
     """Whether single sign-on is set up whole, and its provider answers."""
-    name, mend = "single sign-on", "Look at the settings TOUCHLINE_SSO_...; docs/teams.md has them."
+    name, advice = (
+        "single sign-on",
+        "Look at the settings TOUCHLINE_SSO_...; docs/teams.md has them.",
+    )
     try:
         # Whether it is a team that is served, serve is told on its own command line.
         rules = read_rules(settings.model_copy(update={"team": True}))
@@ -334,7 +339,7 @@ def _check_sign_on(settings: Settings) -> CheckResult:
         return CheckResult(name, True, Provider(rules).refetch_and_describe())
     except (InputError, ConflictError) as error:
         return CheckResult(
-            name, False, error.message, error.hint if isinstance(error, InputError) else mend
+            name, False, error.message, error.hint if isinstance(error, InputError) else advice
         )
 
 
@@ -364,10 +369,10 @@ def _check_linked_admins(store: Store) -> CheckResult | None:
         return None
     count = count_active_admins_linked_to_sign_on(store, rules)
     sentence = f"{count} admins are linked with {rules.label}, by which alone people log in"
-    mend = (
+    advice = (
         None if count else "touchline users reset NAME prints a link with which an admin is linked."
     )
-    return CheckResult("admins", count > 0, sentence, mend)
+    return CheckResult("admins", count > 0, sentence, advice)
 
 
 def _check_permissions(settings: Settings) -> CheckResult:
@@ -375,8 +380,8 @@ def _check_permissions(settings: Settings) -> CheckResult:
     if found:
         sentence = f"other users can read {plural(len(found), 'file or folder', 'files and folders')}: {found[0]}"
         more = " and others" if found[1:] else ""
-        mend = f"Start touchline serve, or run chmod -R go= {settings.home}"
-        return CheckResult("permissions", False, sentence + more, mend)
+        advice = f"Start touchline serve, or run chmod -R go= {settings.home}"
+        return CheckResult("permissions", False, sentence + more, advice)
     return CheckResult("permissions", True, "the home is its owner's alone")
 
 
@@ -387,8 +392,8 @@ def _check_free_space(settings: Settings) -> CheckResult:
     needed = max(ROOM_BYTES, 2 * (database.stat().st_size if database.exists() else 0))
     sentence = f"{free / 1e9:,.1f} GB are free"
     if free < needed:
-        mend = f"Free some space: at least {needed / 1e9:,.1f} GB."
-        return CheckResult("room", False, sentence, mend)
+        advice = f"Free some space: at least {needed / 1e9:,.1f} GB."
+        return CheckResult("room", False, sentence, advice)
     return CheckResult("room", True, sentence)
 
 
@@ -397,8 +402,8 @@ def _check_library_versions() -> CheckResult:
     lacking = [ending for ending in _FORMATS if not cv2.haveImageWriter(ending)]
     sentence = f"SQLite {sqlite}, OpenCV {cv2.__version__}"
     if pysqlite3.dbapi2.sqlite_version_info < MIN_SQLITE:
-        mend = "Install the packages of requirements.lock: this SQLite can corrupt its file."
-        return CheckResult("versions", False, sentence, mend)
+        advice = "Install the packages of requirements.lock: this SQLite can corrupt its file."
+        return CheckResult("versions", False, sentence, advice)
     if lacking:
         sentence += f", which knows no {', '.join(lacking)}"
         return CheckResult(
@@ -446,8 +451,8 @@ def _check_leftovers(settings: Settings) -> CheckResult:
 
 def _check_unused_calibrations(session: Session) -> CheckResult:
     count = len(list_unused_calibrations(session))
-    mend = "The server deletes them when it has nothing to do." if count else None
-    return CheckResult("unused calibrations", True, f"{count:,} that no solution rests on", mend)
+    advice = "The server deletes them when it has nothing to do." if count else None
+    return CheckResult("unused calibrations", True, f"{count:,} that no solution rests on", advice)
 
 
 def _check_unused_uploads(session: Session, settings: Settings) -> CheckResult:
@@ -456,8 +461,8 @@ def _check_unused_uploads(session: Session, settings: Settings) -> CheckResult:
     except DamagedError as error:
         return _unknown_use("uploads", error)
     sentence = f"{len(found):,} kept for frames that no dataset reads"
-    mend = f"Delete the folder {settings.uploads / found[0]}, and the others." if found else None
-    return CheckResult("uploads", True, sentence, mend)
+    advice = f"Delete the folder {settings.uploads / found[0]}, and the others." if found else None
+    return CheckResult("uploads", True, sentence, advice)
 
 
 def _check_unused_frame_files(session: Session, settings: Settings) -> CheckResult:
@@ -466,8 +471,8 @@ def _check_unused_frame_files(session: Session, settings: Settings) -> CheckResu
     except DamagedError as error:
         return _unknown_use("recordings", error)
     sentence = f"{len(found):,} indices and folders of frames that nothing uses"
-    mend = f"Delete {settings.recordings / found[0]}, and the others." if found else None
-    return CheckResult("recordings", True, sentence, mend)
+    advice = f"Delete {settings.recordings / found[0]}, and the others." if found else None
+    return CheckResult("recordings", True, sentence, advice)
 
 
 def _unknown_use(name: str, error: DamagedError) -> CheckResult:

@@ -35,12 +35,13 @@ def doctor(
     require_no_server()
     checks = examine_everything(settings)
     if json_:
-        print_json([vars(check) for check in checks])
+        # `mend` is the earlier name of `advice`; scripts may read it.
+        print_json([{**vars(check), "mend": check.advice} for check in checks])
     else:
         for check in checks:
             say(f"{'ok   ' if check.ok else 'FAULT'} {check.name:24} {check.sentence}")
-            if check.mend:
-                say(f"      {'':24} {check.mend}")
+            if check.advice:
+                say(f"      {'':24} {check.advice}")
     if not all(check.ok for check in checks):
         raise typer.Exit(1)
 

@@ -190,15 +190,15 @@ def _estimate_picture_geometry_of_dataset(
 ) -> None:
     from app.features.datasets.service import filter_by_existing_match
     from app.features.match_estimates.pictures import (
-        choose_requested_geometries,
         estimate_picture_geometries,
+        picture_geometry_by_match,
         set_picture_geometries,
     )
 
     with open_store_to_solve("Estimating", workers) as (store, executor, progress):
         found = estimate_picture_geometries(store, dataset, executor, progress)
         chosen = filter_by_existing_match(found, match, dataset)
-        wanted = choose_requested_geometries(chosen, accept=accept, as_taken=as_taken)
+        wanted = picture_geometry_by_match(chosen, accept=accept, as_taken=as_taken)
         changed = 0
         if wanted:
             with store.write() as session:

@@ -123,15 +123,15 @@ def estimate_picture_geometries(
     return sorted(states, key=lambda state: state.match)
 
 
-def choose_requested_geometries(
+def picture_geometry_by_match(
     chosen: Iterable[MatchPictureGeometryState], *, accept: bool = False, as_taken: bool = False
 ) -> dict[str, PictureGeometry | None]:
-    """What somebody wants the pictures of matches to be, by match.
+    """The picture geometry to set, by match: the proposed one, or None for pictures as taken.
 
     Args:
         chosen: The matches that are meant, as they are.
-        accept: Those that are proposed.
-        as_taken: All of them as they were taken.
+        accept: Use what is proposed; matches without a proposal are left out.
+        as_taken: None for every match: its pictures are as they were taken.
     """
     if as_taken:
         return {item.match: None for item in chosen}

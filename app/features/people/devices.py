@@ -131,10 +131,10 @@ Clock = Callable[[], datetime]
 class PendingActionStore(Protocol):
     """What waits to be taken, for a short while."""
 
-    def put(self, asker: str, value: bytes) -> None:
+    def put(self, key: str, value: bytes) -> None:
         """Let something wait for somebody, in the place of what did."""
 
-    def take(self, asker: str) -> bytes | None:
+    def take(self, key: str) -> bytes | None:
         """What waits for somebody, and from then on does not; None where nothing does that is good."""
 
 
@@ -150,20 +150,20 @@ class InMemoryPendingActions:
         self._clock, self._lasts, self._lock = clock, lasts, Lock()
         self._open: dict[str, tuple[bytes, datetime]] = {}
 
-    def put(self, asker: str, value: bytes) -> None:
+    def put(self, key: str, value: bytes) -> None:
         """See ``PendingActionStore``."""
         at = self._clock()
         with self._lock:
-            self._open.pop(asker, None)
+            self._open.pop(key, None)
             # They lie in the order in which they end.
             while self._open and (len(self._open) >= MOST or self._has_oldest_expired(at)):
                 del self._open[next(iter(self._open))]
-            self._open[asker] = value, at + self._lasts
+            self._open[key] = value, at + self._lasts
 
-    def take(self, asker: str) -> bytes | None:
+    def take(self, key: str) -> bytes | None:
         """See ``PendingActionStore``."""
         with self._lock:
-            value, ends = self._open.pop(asker, (None, None))
+            value, ends = self._open.pop(key, (None, None))
         return value if ends is not None and self._clock() < ends else None
 
     def _has_oldest_expired(self, at: datetime) -> bool:
@@ -177,31 +177,31 @@ class StoredPendingActions:
         store: The database.
         clock: Says what time it is, in UTC.
         lasts: How long something waits.
-        kind: What it is: askers of several kinds may have the same name.
+        kind: What it is: keys of several kinds may be the same.
     """
 
     def __init__(self, store: Store, clock: Clock, lasts: timedelta, kind: str):
         self._store, self._clock, self._lasts, self._kind = store, clock, lasts, kind
 
-    def put(self, asker: str, value: bytes) -> None:
+    def put(self, key: str, value: bytes) -> None:
         """See ``PendingActionStore``."""
         at = self._clock()
         closed, ends = self._encryption_key().encrypt(value), format_utc_time(at + self._lasts)
         with self._store.write(lasting=False) as session:
             store_pending_action(
-                session, self._hash_name(asker), closed, ends, format_utc_time(at), MOST
+                session, self._hash_name(key), closed, ends, format_utc_time(at), MOST
             )
 
-    def take(self, asker: str) -> bytes | None:
+    def take(self, key: str) -> bytes | None:
         """See ``PendingActionStore``."""
         with self._store.write() as session:
             closed = take_pending_action(
-                session, self._hash_name(asker), format_utc_time(self._clock())
+                session, self._hash_name(key), format_utc_time(self._clock())
             )
         return None if closed is None else self._encryption_key().decrypt(closed)
 
-    def _hash_name(self, asker: str) -> str:
-        return hash_token(f"{self._kind}/{asker}")
+    def _hash_name(self, key: str) -> str:
+        return hash_token(f"{self._kind}/{key}")
 
     def _encryption_key(self) -> Fernet:
         return Fernet(urlsafe_b64encode(get_or_make_secret_key(self._store.settings, BEGUN)))
@@ -222,15 +222,15 @@ class PasskeyChallenges:
     def __init__(self, waiting: PendingActionStore):
         self._waiting = waiting
 
-    def make(self, asker: str) -> bytes:
+    def make(self, key: str) -> bytes:
         """A challenge for somebody, in the place of the one that they had."""
         challenge = secrets.token_bytes(BYTES)
-        self._waiting.put(asker, challenge)
+        self._waiting.put(key, challenge)
         return challenge
 
-    def take(self, asker: str) -> bytes | None:
+    def take(self, key: str) -> bytes | None:
         """The challenge of somebody, who has none then; None where none is good."""
-        return self._waiting.take(asker)
+        return self._waiting.take(key)
 
 
 DIGITS, SECONDS = 6, 30

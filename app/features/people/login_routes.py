@@ -115,9 +115,9 @@ def begin_passkey_login(
     """What a browser needs to log in with a passkey; it is for this browser, which gets a cookie."""
     team.require_password_login_allowed()
     team.attempts.count_challenge(team.find_client_address(request))
-    asker = secrets.token_urlsafe()
-    options = team.passkeys.begin_login(asker, team.make_passkey_site(request))
-    response.set_cookie(**team.cookies.make_passkey_cookie(asker))
+    browser_token = secrets.token_urlsafe()
+    options = team.passkeys.begin_login(browser_token, team.make_passkey_site(request))
+    response.set_cookie(**team.cookies.make_passkey_cookie(browser_token))
     return PasskeyRequestOptions(options=options)
 
 
@@ -167,10 +167,10 @@ def get_second_factor(team: AppTeam, me: Me) -> FactorState:
     OWN_FACTOR, operation_id="beginSecondFactor", responses=responses(401, 409, 413, 415, 429)
 )
 @may(Action.ACCOUNT, to_enrol=True)
-def begin_second_factor(said: PasswordOnly, request: Request, team: AppTeam, me: Me) -> Enrolment:
+def begin_second_factor(body: PasswordOnly, request: Request, team: AppTeam, me: Me) -> Enrolment:
     """What an authenticator has to know, shown this once; nothing is asked for before it is confirmed."""
     team.count_login_attempt(request, me.name)
-    return team.factors.begin(me, said.password)
+    return team.factors.begin(me, body.password)
 
 
 @second_factors_router.post(

@@ -57,7 +57,7 @@ MOST = 20
 """Passkeys of one person."""
 VERIFIED = UserVerificationRequirement.REQUIRED
 REFUSED = "this passkey is not accepted"
-AGAIN = (
+RETRY_HINT = (
     "Try again; if it fails again, log in with your password and add another passkey under Account."
 )
 LATE = "the request has expired, or was answered already"
@@ -203,23 +203,23 @@ class Passkeys:
                 session, login.name, login.name, "no passkey", login.role, passkey=name
             )
 
-    def begin_login(self, asker: str, site: PasskeySite) -> dict[str, Any]:
+    def begin_login(self, browser_token: str, site: PasskeySite) -> dict[str, Any]:
         """What a browser needs to log in with a passkey (PublicKeyCredentialRequestOptionsJSON).
 
         Args:
-            asker: What this browser alone knows.
+            browser_token: The random token in this browser's cookie.
             site: For whom.
         """
         options = generate_authentication_options(
             rp_id=site.name,
-            challenge=self._challenges.make(_browser_challenge_key(asker)),
+            challenge=self._challenges.make(_browser_challenge_key(browser_token)),
             user_verification=VERIFIED,
         )
         return options_to_json_dict(options)
 
     def log_in(
         self,
-        asker: str,
+        browser_token: str,
         credential: dict[str, Any],
         site: PasskeySite,
         *,
@@ -233,20 +233,20 @@ class Passkeys:
             NotLoggedInError: It is nobody's, does not answer what this browser was asked last, is not
                 for this site, was copied (its count goes back), or the account is disabled.
         """
-        challenge = self._challenges.take(_browser_challenge_key(asker))
+        challenge = self._challenges.take(_browser_challenge_key(browser_token))
         if challenge is None:
             raise NotLoggedInError(LATE, hint="Try again.")
         with self._store.read() as session:
             row = find_passkey(session, str(credential.get("id")))
             person = find_person_by_id(session, row.person_id) if row else None
         if row is None or person is None:
-            raise NotLoggedInError(REFUSED, hint=AGAIN)
+            raise NotLoggedInError(REFUSED, hint=RETRY_HINT)
 
         def verify_signature_and_record_use(session: Session) -> None:
             # Read again: another login with it may have counted meanwhile, or it was taken away.
             found = find_passkey(session, row.credential)
             if found is None or found.person_id != row.person_id:
-                raise NotLoggedInError(REFUSED, hint=AGAIN)
+                raise NotLoggedInError(REFUSED, hint=RETRY_HINT)
             count = _verify_signature_and_get_count(found, credential, challenge, site)
             update_passkey_use(session, found.id, count, format_utc_time(self._clock()))
 
@@ -299,7 +299,7 @@ def _verify_signature_and_get_count(
         ).new_sign_count
     except Exception as error:  # As above.
         log.warning("a passkey was refused", passkey=row.id, reason=str(error)[:200])
-        raise NotLoggedInError(REFUSED, hint=AGAIN) from error
+        raise NotLoggedInError(REFUSED, hint=RETRY_HINT) from error
 
 
 def _require_passkey_limit(rows: Any) -> None:
@@ -316,5 +316,5 @@ def _session_challenge_key(login: Login) -> str:
     return f"session {login.session_key}"
 
 
-def _browser_challenge_key(asker: str) -> str:
-    return f"browser {hash_token(asker)}"
+def _browser_challenge_key(browser_token: str) -> str:
+    return f"browser {hash_token(browser_token)}"

@@ -133,8 +133,8 @@ LEEWAY_SECONDS = 60
 """So far the provider's clock may be from ours."""
 KEPT = timedelta(hours=1)
 """So long we remember where the provider is and what its keys are."""
-AGAIN = timedelta(minutes=1)
-"""Its keys are asked for no more often, whatever a token names."""
+MIN_KEY_FETCH_INTERVAL = timedelta(minutes=1)
+"""Least time between two requests for the keys of the provider."""
 REFUSED_HINT = "Try again; if it fails again, tell the operator of this server."
 _HIDDEN = "client_secret_basic", "client_secret_post"
 _FORM = {"Content-Type": "application/x-www-form-urlencoded"}
@@ -305,7 +305,7 @@ class Provider:
     def _refetch_keys(self) -> jwk.KeySet:
         """Its keys, asked for again where it may have changed them since."""
         kept = self._keys
-        if kept is not None and self._clock() - kept.at < AGAIN:
+        if kept is not None and self._clock() - kept.at < MIN_KEY_FETCH_INTERVAL:
             known: jwk.KeySet = kept.value
             return known
         return self._fetch_keys()

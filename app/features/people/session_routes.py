@@ -293,15 +293,15 @@ def begin_sign_on(
     """Where to go to log in by single sign-on; it is for this browser, which gets a cookie."""
     sign_on = team.require_sign_on_provider()
     team.attempts.count_challenge(team.find_client_address(request))
-    asker = secrets.token_urlsafe()
+    browser_token = secrets.token_urlsafe()
     address = sign_on.begin(
-        asker,
+        browser_token,
         redirect=team.make_sign_on_return_url(request),
         to=body.to,
         link=body.link,
         name=body.name,
     )
-    response.set_cookie(**team.cookies.make_sign_on_cookie(asker))
+    response.set_cookie(**team.cookies.make_sign_on_cookie(browser_token))
     return SignOnStarted(address=address)
 
 
@@ -374,11 +374,11 @@ def begin_identity_link(
     """Where to go to link an account of the provider with one's own; takes the password."""
     sign_on = team.require_sign_on_provider()
     team.count_login_attempt(request, me.name)
-    asker = secrets.token_urlsafe()
+    browser_token = secrets.token_urlsafe()
     address = sign_on.begin_linking_account(
-        asker, me, body.password, redirect=team.make_sign_on_return_url(request)
+        browser_token, me, body.password, redirect=team.make_sign_on_return_url(request)
     )
-    response.set_cookie(**team.cookies.make_sign_on_cookie(asker))
+    response.set_cookie(**team.cookies.make_sign_on_cookie(browser_token))
     return SignOnStarted(address=address)
 
 

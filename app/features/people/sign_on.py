@@ -112,7 +112,7 @@ class SignOn:
 
     def begin(
         self,
-        asker: str,
+        browser_token: str,
         *,
         redirect: str,
         to: str = "/groups",
@@ -122,7 +122,7 @@ class SignOn:
         """The address at the provider where somebody logs in.
 
         Args:
-            asker: What this browser alone knows.
+            browser_token: The random token in this browser's cookie.
             redirect: The page of ours to which the provider sends them back.
             to: The page to which they go then.
             link: The token of a link that they follow.
@@ -137,10 +137,10 @@ class SignOn:
             raise InputError("this is not a page of this server", pointer="/to")
         if link is not None and find_link_holder(self._store, link).name is None:
             name = normalize_user_name(name or "")
-        return self._begin_login(asker, redirect, to, link=link, name=name)
+        return self._begin_login(browser_token, redirect, to, link=link, name=name)
 
     def begin_linking_account(
-        self, asker: str, login: Login, password: str | None, *, redirect: str
+        self, browser_token: str, login: Login, password: str | None, *, redirect: str
     ) -> str:
         """The address where somebody who is logged in shows which account is theirs.
 
@@ -151,11 +151,11 @@ class SignOn:
         require_password(self._store, login, password, self._clock())
         with self._store.read() as session:
             require_no_identity(session, login.person_id, self.rules)
-        return self._begin_login(asker, redirect, "/account", session=login.session_key)
+        return self._begin_login(browser_token, redirect, "/account", session=login.session_key)
 
     def finish(
         self,
-        asker: str,
+        browser_token: str,
         state: str,
         code: str,
         *,
@@ -170,7 +170,7 @@ class SignOn:
         """What follows once somebody comes back from the provider.
 
         Args:
-            asker: What this browser alone knows.
+            browser_token: The random token in this browser's cookie.
             state: Which login it is.
             code: What the provider gave for it.
             factor: A code of their second factor, where the answer before asked for it.
@@ -191,7 +191,7 @@ class SignOn:
         """
         found = self._begun.take(hash_token(state))
         begun = None if found is None else _PendingLogin.from_json_bytes(found)
-        if begun is None or not compare_digest(begun.browser, hash_token(asker)):
+        if begun is None or not compare_digest(begun.browser, hash_token(browser_token)):
             raise NotLoggedInError(LATE, hint="Begin again.")
         if issuer is not None and issuer != self.rules.issuer:
             raise NotLoggedInError("the response comes from another provider", hint="Begin again.")
@@ -235,14 +235,14 @@ class SignOn:
             raise
         return SignOnResult(token, begun.to)
 
-    def _begin_login(self, asker: str, redirect: str, to: str, **more: Any) -> str:
+    def _begin_login(self, browser_token: str, redirect: str, to: str, **more: Any) -> str:
         request = ProviderLoginRequest(
             redirect, make_random_token(), make_random_token(), secrets.token_urlsafe(48)
         )
         address = self._provider.make_login_url(request)
         self._begun.put(
             hash_token(request.state),
-            _PendingLogin(hash_token(asker), request, to, **more).to_json_bytes(),
+            _PendingLogin(hash_token(browser_token), request, to, **more).to_json_bytes(),
         )
         return address
 

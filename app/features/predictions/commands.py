@@ -46,7 +46,7 @@ Query = Annotated[
 
 BALLS, CAMERAS = "Predicted balls", "Predicted cameras"
 RECORDING = "Frames of a recording"
-CAREFUL, TRUTH, RESULT = "Reference boxes", "The truth", "The result"
+REFERENCE, TRUTH, RESULT = "Reference boxes", "The truth", "The result"
 Predictions = Annotated[
     Path | None,
     typer.Argument(
@@ -86,21 +86,34 @@ Cameras = Annotated[
         exists=True, rich_help_panel=CAMERAS, help="Folder or zip of SoccerNet camera JSON."
     ),
 ]
-Careful = Annotated[
+Reference = Annotated[
     Path | None,
     typer.Option(
-        rich_help_panel=CAREFUL,
+        "--reference",
+        "--careful",
+        rich_help_panel=REFERENCE,
         help="Reference boxes, one a frame, which the dataset's are measured with: a file, folder or "
-        "zip, or the name of a set. Only the --careful options apply to them.",
+        "zip, or the name of a set. Only the --reference options apply to them.",
     ),
 ]
-CarefulFormat = Annotated[
+ReferenceFormat = Annotated[
     AnyPredictionFormat,
-    typer.Option(rich_help_panel=CAREFUL, help="As --format, of the reference boxes."),
+    typer.Option(
+        "--reference-format",
+        "--careful-format",
+        rich_help_panel=REFERENCE,
+        help="As --format, of the reference boxes.",
+    ),
 ]
-CarefulCategory = Annotated[
+ReferenceCategory = Annotated[
     int | None,
-    typer.Option(min=0, rich_help_panel=CAREFUL, help="As --category, of the reference boxes."),
+    typer.Option(
+        "--reference-category",
+        "--careful-category",
+        min=0,
+        rich_help_panel=REFERENCE,
+        help="As --category, of the reference boxes.",
+    ),
 ]
 Version = Annotated[
     str | None,
@@ -364,9 +377,11 @@ CamerasSize = Annotated[
     ImageSize | None,
     _make_size_option(CAMERAS, "Size of the images of these cameras."),
 ]
-CarefulSize = Annotated[
+ReferenceSize = Annotated[
     ImageSize | None,
-    _make_size_option(CAREFUL, "As --size, of the reference boxes."),
+    _make_size_option(
+        REFERENCE, "As --size, of the reference boxes.", "--reference-size", "--careful-size"
+    ),
 ]
 
 
@@ -381,10 +396,10 @@ def evaluate(
     min_score: MinScore = 0.0,
     cameras: Cameras = None,
     cameras_size: CamerasSize = None,
-    careful: Careful = None,
-    careful_format: CarefulFormat = "auto",
-    careful_size: CarefulSize = None,
-    careful_category: CarefulCategory = None,
+    reference: Reference = None,
+    reference_format: ReferenceFormat = "auto",
+    reference_size: ReferenceSize = None,
+    reference_category: ReferenceCategory = None,
     version: Version = None,
     groups: Groups = "passing",
     split: SplitName = None,
@@ -397,15 +412,17 @@ def evaluate(
 
     What was read is kept in the dataset as predictions, and the result as an evaluation.
     """
-    if predictions is None and careful is None and cameras is None:
-        raise typer.BadParameter("name predictions, --cameras or --careful")
+    if predictions is None and reference is None and cameras is None:
+        raise typer.BadParameter("name predictions, --cameras or --reference")
     from app.features.predictions.evaluation_run import EvaluationRequest, SourcesEvaluationRequest
     from app.features.predictions.reader import PredictionFiles
 
     request = SourcesEvaluationRequest(
         EvaluationRequest(name=name, groups=groups, split=split, boxes=boxes, min_score=min_score),
         PredictionFiles(predictions, format_, images, cameras, category, size, cameras_size),
-        PredictionFiles(careful, careful_format, category=careful_category, size=careful_size),
+        PredictionFiles(
+            reference, reference_format, category=reference_category, size=reference_size
+        ),
         version,
     )
     request.refuse_unused_options()

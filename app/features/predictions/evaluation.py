@@ -34,7 +34,7 @@ from app.evaluation.track_scores import GroundTruthTrack, evaluate_tracks
 from app.features.audit.service import add_audit_event
 from app.features.datasets.service import DatasetHead, read_dataset_head
 from app.features.predictions import queries as frame_rows
-from app.features.predictions.frames import make_truth_pins
+from app.features.predictions.frames import describe_ground_truth
 from app.features.predictions.queries import (
     FrameCondition,
     PredictionSet,
@@ -351,11 +351,13 @@ def evaluate_stored_tracks(
     """
     if version is None:
         values = collect_accepted_tracks(session, dataset)
-        pins = make_truth_pins(dataset.policy, SOLVER_VERSION, digest_json(values), "accepted")
+        pins = describe_ground_truth(
+            dataset.policy, SOLVER_VERSION, digest_json(values), "accepted"
+        )
     else:
         bodies = read_frozen(session, version.dataset_id, version.tracks.values())
         values = {key: decode_frozen_json(bodies[name]) for key, name in version.tracks.items()}
-        pins = make_truth_pins(
+        pins = describe_ground_truth(
             version.policy, version.solver_version, version.hash, version.groups, version
         )
     if not values:

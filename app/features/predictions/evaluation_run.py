@@ -43,20 +43,20 @@ LISTED = 5
 """Frames that a refusal names; all are counted."""
 
 
-def read_reference_boxes(session: Session, careful: PredictionSet) -> dict[int, Box]:
+def read_reference_boxes(session: Session, reference: PredictionSet) -> dict[int, Box]:
     """The reference box of each view, by its id.
 
     Raises:
         InputError: A frame has several; nobody can tell which one would be the truth.
     """
-    found = read_boxes(session, careful.id)
+    found = read_boxes(session, reference.id)
     several = {view for view, boxes in found.items() if len(boxes) > 1}
     if several:
-        rows = list_dataset_views(session, careful.dataset_id)
+        rows = list_dataset_views(session, reference.dataset_id)
         names = [_make_frame_name(row) for row in rows if row.id in several]
         more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
         raise InputError(
-            f'frames of the reference boxes "{careful.name}" have more than one box: '
+            f'frames of the reference boxes "{reference.name}" have more than one box: '
             f"{', '.join(names[:LISTED])}{more}",
             hint="Keep the one box of each frame that is the ball.",
             pointer="/careful",
@@ -129,7 +129,7 @@ class EvaluationRequest:
     Attributes:
         name: For people; empty: named after the predictions.
         predictions: Set of ball boxes, cameras or both; None only where ``careful`` is given.
-        careful: Set whose boxes are careful ones, which the dataset's boxes are measured with.
+        careful: Set of reference boxes, which the dataset's boxes are measured against.
         version: Frozen version; None: the dataset as it is now.
         groups: Without a version: ``passing``, ``accepted`` or ``all``.
         split: Frames of this split alone; None: all.
@@ -325,7 +325,7 @@ def _require_own_set(
 
 
 def _read_inputs(session: Session, sets: Mapping[str, PredictionSet]) -> EvaluationInputs:
-    predictions, careful = sets.get("predictions"), sets.get("careful")
+    predictions, reference = sets.get("predictions"), sets.get("careful")
     detections = cameras = boxes = None
     if predictions is not None:
         if predictions.boxes or not predictions.cameras:
@@ -335,8 +335,8 @@ def _read_inputs(session: Session, sets: Mapping[str, PredictionSet]) -> Evaluat
             }
         if predictions.cameras:
             cameras = read_predicted_cameras(session, predictions.id)
-    if careful is not None:
-        boxes = read_reference_boxes(session, careful)
+    if reference is not None:
+        boxes = read_reference_boxes(session, reference)
     return EvaluationInputs(detections, boxes, cameras)
 
 
@@ -369,7 +369,7 @@ def _require_common_frames(
     frames = {frame.id for frame in truth.frames}
     for name, predicted in (
         ("predictions", {*(inputs.detections or {}), *(inputs.cameras or {})}),
-        ("careful", set(inputs.careful or {})),
+        ("careful", set(inputs.reference or {})),
     ):
         if predicted and not predicted & frames:
             raise InputError(
@@ -396,13 +396,13 @@ class SourcesEvaluationRequest:
     Attributes:
         request: Without sets and version; they are filled in.
         predictions: Predicted boxes and cameras, or empty.
-        careful: Boxes drawn with care, by which the truth itself is measured; or empty.
+        reference: Reference boxes, which the boxes of the dataset are measured against; or empty.
         version: Name, id or hash of a frozen version; None: the dataset as it is now.
     """
 
     request: EvaluationRequest
     predictions: PredictionFiles
-    careful: PredictionFiles
+    reference: PredictionFiles
     version: str | None = None
 
     def refuse_unused_options(self) -> None:
@@ -412,7 +412,7 @@ class SourcesEvaluationRequest:
             InputError: Naming the option.
         """
         self.predictions.refuse_unused_options()
-        self.careful.refuse_unused_options("careful-")
+        self.reference.refuse_unused_options("reference-")
         refuse_group_rule_beside_version(self.request.groups, self.version)
 
 
@@ -451,7 +451,7 @@ def evaluate_sources(
         None
         if source.names_no_file
         else read_or_find_prediction_set(store, dataset, source, actor=actor)
-        for source in (wanted.predictions, wanted.careful)
+        for source in (wanted.predictions, wanted.reference)
     )
     request = replace(
         wanted.request,

@@ -61,7 +61,7 @@ def read_version_truth(session: Session, version: Version, split: str | None) ->
                     frames.append(frame)
                     gone += frame.id < 0
             seen += len(item.group.views)
-    pins = make_truth_pins(
+    pins = describe_ground_truth(
         version.policy, version.solver_version, version.hash, version.groups, version
     )
     return EvaluationTruth(tuple(frames), version.policy, gone, pins)
@@ -97,7 +97,7 @@ def read_live_truth(
                 )
                 if split is None or frame.split == split
             ]
-    pins = make_truth_pins(dataset.policy, SOLVER_VERSION, digest_json(sorted(hashes)), rule)
+    pins = describe_ground_truth(dataset.policy, SOLVER_VERSION, digest_json(sorted(hashes)), rule)
     return EvaluationTruth(tuple(frames), dataset.policy, 0, pins)
 
 
@@ -148,16 +148,16 @@ def _iterate_frozen_frames(
     yield from iterate_group_frames(item.group, item.solution, group_id, ids, splits)
 
 
-def make_truth_pins(
+def describe_ground_truth(
     policy: Policy, solver_version: str, state: str, groups: str, version: Version | None = None
 ) -> dict[str, Json]:
-    """What makes a truth the one that it is.
+    """The pins of an evaluation that identify its ground truth, as JSON.
 
     Args:
-        policy: That judged it.
-        solver_version: That computed it.
-        state: Digest of it, of a version its hash.
-        groups: Which of them take part.
+        policy: The policy that judged it.
+        solver_version: The solver that computed it.
+        state: Digest of its content; for a version, its hash.
+        groups: Which groups take part.
         version: Whose truth it is; None: the dataset as it was.
     """
     return {

@@ -80,7 +80,7 @@ class PredictionFiles:
         """Refuse options of a command that nothing uses: those of files where none is read.
 
         Args:
-            prefix: Before the names of its options, ``careful-``.
+            prefix: Before the names of its options, ``reference-``.
 
         Raises:
             InputError: Naming the option.

@@ -33,7 +33,7 @@ from app.features.policies.noise import (
 from app.features.policies.service import PolicyState, apply_policy
 from app.features.solutions.queries import list_unsolved_groups
 from app.features.solutions.service import SolveReport, list_stale_groups, solve_dataset
-from app.features.what_if.service import AT_ONCE, YieldStore
+from app.features.what_if.service import AT_ONCE, WhatIfStore
 from app.progress import ReportProgress
 from app.soccer.actors import LOCAL_USER
 from app.soccer.pitch import Pitch
@@ -104,7 +104,7 @@ def refresh_yield_table(
     if report.solved > AT_ONCE:
         found = get_dataset_head(store, dataset)
         progress(report.total, report.total, f"Counting what {found.name} yields.")
-        YieldStore(store).update_table(found.id)
+        WhatIfStore(store).update_table(found.id)
 
 
 KIND, EDITED = "solve", "edited"

@@ -12,7 +12,7 @@ from sqlalchemy import ColumnElement, delete, func, select, tuple_, update
 
 from app.db.dialects.dialect import insert
 from app.db.json_columns import Json, parse_json_column
-from app.db.log import DEEDS, LogModel
+from app.db.log import AUDIT_KINDS, LogModel
 from app.db.session import Session, now
 from app.features.batches.queries import count_work, find_batch, list_batch_people
 from app.features.datasets.queries import read_dataset_name
@@ -115,7 +115,7 @@ def list_log_entries_since(
     where = (
         LogModel.id > log_id,
         LogModel.dataset_id == dataset_id,
-        LogModel.kind.not_in((*DEEDS, *_DISTINCT_KINDS)),
+        LogModel.kind.not_in((*AUDIT_KINDS, *_DISTINCT_KINDS)),
     )
     return session.rows(
         LoggedEvent, select(*columns).where(*where).order_by(LogModel.id).limit(most)

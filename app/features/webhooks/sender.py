@@ -136,11 +136,12 @@ def _address_error(text: str, pointer: str | None) -> InputError:
 
 log = structlog.get_logger("touchline.webhooks")
 
-AGAIN = tuple(
+RETRY_DELAYS = tuple(
     timedelta(seconds=5) if minutes == 0 else timedelta(minutes=minutes)
     for minutes in (0, 5, 30, 120, 300, 600, 840, 1200, 1440)
 )
-"""How long to wait after each try that failed, as standardwebhooks.com recommends; then it is given up."""
+"""Time to wait after each failed try (5 s to 24 h), as standardwebhooks.com recommends; then the message
+is given up."""
 SECONDS = 15.0
 """So long a receiver may take for all of its answer."""
 TOGETHER, OF_ONE = 32, 4
@@ -353,8 +354,8 @@ class WebhookSender:
         values: dict[str, Any] = {**tried, "problem": answer.problem, "next_at": None}
         if answer.problem is None:
             values["state"] = DELIVERED
-        elif row.attempts < len(AGAIN) and answer.status != GONE:
-            values["next_at"] = format_utc_time(now + AGAIN[row.attempts])
+        elif row.attempts < len(RETRY_DELAYS) and answer.status != GONE:
+            values["next_at"] = format_utc_time(now + RETRY_DELAYS[row.attempts])
         else:
             values["state"] = FAILED
         update_delivery(session, row.id, values)

@@ -17,7 +17,7 @@ from app.features.what_if.block_results import (
     map_in_threads,
     sum_group_counts,
 )
-from app.features.what_if.service import TableBlock, TableSnapshot, YieldStore
+from app.features.what_if.service import TableBlock, TableSnapshot, WhatIfStore
 from app.features.what_if.table import JAC_STEPS
 from app.geometry.arrays import IntArray
 from app.soccer.policy import BOXES, CALIBRATION, PITCH, Policy
@@ -91,7 +91,7 @@ class Yield:
 
 
 def count_yield(
-    yields: YieldStore, dataset_id: int, values: Mapping[str, Any] | None = None
+    yields: WhatIfStore, dataset_id: int, values: Mapping[str, Any] | None = None
 ) -> Yield:
     """What a dataset's policy lets through, or what it would with other values.
 

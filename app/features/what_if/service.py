@@ -150,7 +150,7 @@ class _YieldEntry:
     """How many groups are read, and how many are left: for who asks meanwhile."""
 
 
-class YieldStore:
+class WhatIfStore:
     """The tables of the datasets that somebody asked about."""
 
     def __init__(self, store: Store):
@@ -341,8 +341,8 @@ def examine_yield_cache(settings: Settings) -> CheckResult:
     if damaged:
         more = "" if len(damaged) == 1 else f" and {plural(len(damaged) - 1, 'other')}"
         sentence = f"{damaged[0].relative_to(settings.home)}{more} cannot be read as written"
-        mend = f"Stop the server and delete {settings.yields}: yields are counted anew."
-        return CheckResult("yields", False, sentence, mend)
+        advice = f"Stop the server and delete {settings.yields}: yields are counted anew."
+        return CheckResult("yields", False, sentence, advice)
     count = plural(len(files), "file")
     return CheckResult("yields", True, f"{count} in the cache, each as it was written")
 

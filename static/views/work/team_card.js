@@ -17,7 +17,7 @@ import { Trouble } from '../page_frame.js';
 import { Term } from '../term.js';
 import { When } from '../when.js';
 import { ConfirmButton } from '../evaluation/confirm_button.js';
-import { ReassignDialog } from './give_on_dialog.js';
+import { ReassignDialog } from './reassign_dialog.js';
 import { Due, Progress } from './parts.js';
 
 /** @import {DatasetJson} from '../../api/types.js' */

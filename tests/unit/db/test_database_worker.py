@@ -208,7 +208,7 @@ class TestRunInWorker:
             pass
 
     def test_damage_that_was_seen_here_ends_its_changes(self, own_store: Store) -> None:
-        own_store.note_damage(DamagedError("a page is lost"))
+        own_store.record_damage(DamagedError("a page is lost"))
         with pytest.raises(DamagedError, match="nothing can be changed now"):
             run(own_store, write)
         assert list_datasets(own_store) == []

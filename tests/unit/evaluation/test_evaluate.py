@@ -77,16 +77,16 @@ class TestEvaluate:
         assert first == again
 
     def test_only_what_the_inputs_allow_is_there(self, frames) -> None:
-        careful = {frame.id: frame.boxes["exact"] for frame in frames if frame.boxes}
+        reference = {frame.id: frame.boxes["exact"] for frame in frames if frame.boxes}
         result = evaluate(
-            frames, EvaluationInputs(careful=careful), EvaluationOptions(resamples=50)
+            frames, EvaluationInputs(reference=reference), EvaluationOptions(resamples=50)
         )
         assert [table.name for table in result.tables] == ["boxes", "sensitivity"]
         assert [figure.name for figure in result.figures] == ["box_overlap", "sensitivity"]
         cameras = {frame.id: camera_at(50.0) for frame in frames}
         whole = evaluate(
             frames,
-            EvaluationInputs(found_in(frames, "exact"), careful, cameras),
+            EvaluationInputs(found_in(frames, "exact"), reference, cameras),
             EvaluationOptions(resamples=50),
         )
         assert {table.name for table in whole.tables} == {
@@ -121,9 +121,9 @@ def beside(box: Box) -> Box:
 class TestBoxesTable:
     def test_measures_every_kind_over_the_same_frames(self, make_frame) -> None:
         frame, bare = make_frame(1), replace(make_frame(2), boxes={})
-        careful = {1: frame.boxes["exact"], 2: frame.boxes["exact"], 99: frame.boxes["exact"]}
-        table = make_boxes_table([frame, bare], careful, {}, ONE_MATCH)
-        # The annotated box is 1.25 times the careful one: IoU 0.64, and a quarter of d over the
+        reference = {1: frame.boxes["exact"], 2: frame.boxes["exact"], 99: frame.boxes["exact"]}
+        table = make_boxes_table([frame, bare], reference, {}, ONE_MATCH)
+        # The annotated box is 1.25 times the reference one: IoU 0.64, and a quarter of d over the
         # diagonal of a square.
         assert table.cell("annotated", "iou").value == pytest.approx(0.64)
         assert table.cell("annotated", "size_error_percent").value == pytest.approx(25 / 2**0.5)
@@ -141,10 +141,10 @@ class TestBoxesTable:
     def test_only_the_row_whose_overlap_is_kept_opens_frames(self, make_frame) -> None:
         frame, bare = make_frame(1), make_frame(2)
         bare = replace(bare, boxes={"annotated": bare.boxes["annotated"]})
-        careful = {1: frame.boxes["exact"], 2: frame.boxes["exact"]}
+        reference = {1: frame.boxes["exact"], 2: frame.boxes["exact"]}
         result = evaluate(
             [frame, bare],
-            EvaluationInputs(careful=careful),
+            EvaluationInputs(reference=reference),
             EvaluationOptions(boxes="annotated", resamples=20),
         )
         table = result.table("boxes")
@@ -184,18 +184,18 @@ class TestBoxesTable:
         self, make_frame, lacking: str
     ) -> None:
         whole, part = make_frame(1), make_frame(2)
-        careful = {frame.id: frame.boxes["exact"] for frame in (whole, part)}
+        reference = {frame.id: frame.boxes["exact"] for frame in (whole, part)}
         found = {frame.id: [Detection(frame.boxes["exact"], 0.5)] for frame in (whole, part)}
         part = replace(part, boxes={k: box for k, box in part.boxes.items() if k != lacking})
-        table = make_boxes_table([whole, part], careful, found, ONE_MATCH)
+        table = make_boxes_table([whole, part], reference, found, ONE_MATCH)
         counts = {(cell.count, cell.of) for row in table.rows for cell in row.cells}
         assert len(table.rows) == 4 and counts == {(1, 2)}
 
     def test_every_number_says_of_how_many_careful_boxes_it_was_computed(self, make_frame) -> None:
         frames = [make_frame(1), make_frame(2), make_frame(3)]
-        careful = dict.fromkeys((1, 2, 7, 8), frames[0].boxes["exact"])
+        reference = dict.fromkeys((1, 2, 7, 8), frames[0].boxes["exact"])
         found = {1: [Detection(frames[0].boxes["exact"], 0.5)]}
-        table = make_boxes_table(frames, careful, found, ONE_MATCH)
+        table = make_boxes_table(frames, reference, found, ONE_MATCH)
         told = {row.name: [(cell.count, cell.of) for cell in row.cells] for row in table.rows}
         assert told.pop("detected") == [(1, 4), (1, 4)]
         assert set(map(tuple, told.values())) == {((2, 4), (2, 4))}
@@ -222,8 +222,8 @@ class TestBoxesTable:
 
     def test_intervals_are_of_whole_matches(self, make_frame) -> None:
         one, other = make_frame(1, match="a"), make_frame(2, match="b")
-        careful = {1: one.boxes["exact"], 2: other.boxes["annotated"]}
-        table = make_boxes_table([one, other], careful, {}, MatchResamples.draw(["a", "b"]))
+        reference = {1: one.boxes["exact"], 2: other.boxes["annotated"]}
+        table = make_boxes_table([one, other], reference, {}, MatchResamples.draw(["a", "b"]))
         cell = table.cell("annotated", "iou")
         # Of two matches a resample draws one twice in half of all cases.
         assert (cell.low, cell.high) == pytest.approx((0.64, 1.0))
@@ -232,8 +232,8 @@ class TestBoxesTable:
 class TestBoxesFigure:
     def test_every_box_of_every_frame_is_a_point_that_opens_its_frame(self, make_frame) -> None:
         near, far, nowhere = make_frame(1), make_frame(2), make_frame(3)
-        careful = {frame.id: frame.boxes["exact"] for frame in (near, far, nowhere)}
-        figure = make_boxes_figure([near, far, nowhere], careful, {1: 30.0, 2: 20.0})
+        reference = {frame.id: frame.boxes["exact"] for frame in (near, far, nowhere)}
+        figure = make_boxes_figure([near, far, nowhere], reference, {1: 30.0, 2: 20.0})
         overlap, size = figure.panels
         series = {item.name: item for item in overlap.series}
         assert set(series) == {"annotated", "optimized", "exact"}
@@ -248,7 +248,7 @@ class TestBoxesFigure:
         frame = make_frame(1)
         result = evaluate(
             [frame],
-            EvaluationInputs(careful={1: frame.boxes["exact"]}),
+            EvaluationInputs(reference={1: frame.boxes["exact"]}),
             EvaluationOptions(resamples=20),
         )
         (figure,) = [figure for figure in result.figures if figure.name == "box_overlap"]
@@ -265,8 +265,8 @@ class TestBoxesFigure:
 
     def test_frames_that_are_nearly_as_far_open_each_its_own(self, make_frame) -> None:
         frames = [make_frame(number) for number in (1, 2, 3)]
-        careful = {frame.id: frame.boxes["exact"] for frame in frames}
-        figure = make_boxes_figure(frames, careful, {1: 20.0, 2: 20.0 + 1e-9})
+        reference = {frame.id: frame.boxes["exact"] for frame in frames}
+        figure = make_boxes_figure(frames, reference, {1: 20.0, 2: 20.0 + 1e-9})
         assert figure.note.startswith("2 frames;")
         series = figure.panels[0].series[0]
         for place, behind in zip(series.x, series.frames, strict=True):

@@ -265,7 +265,7 @@ def test_a_database_that_was_seen_to_be_damaged_is_said_while_it_answers(
     app: FastAPI, api: TestClient, read
 ) -> None:
     assert read("touchline_database_damaged") == 0
-    app.state.services.store.note_damage(DamagedError("a row is torn"))
+    app.state.services.store.record_damage(DamagedError("a row is torn"))
     assert api.get("/readyz").status_code == 503
     assert (read("touchline_database_damaged"), read("touchline_database_up")) == (1, 1)
 
@@ -275,7 +275,7 @@ def test_damage_that_the_numbers_themselves_meet_is_said_at_once(
 ) -> None:
     def meet(store: Store) -> None:
         error = DamagedError("a row is torn")
-        store.note_damage(error)
+        store.record_damage(error)
         raise error
 
     monkeypatch.setattr("app.http.metrics.read_home_report", meet)

@@ -15,8 +15,8 @@ from app.soccer.solution import Calibration
 from app.solving.ball_covariance import CovarianceOfMeanBall
 from app.solving.chi_square import (
     ChiSquareResiduals,
-    chi_square_residuals,
     compute_leave_one_out_chi_square,
+    fit_balls_and_test_residuals,
     sigma_widening,
 )
 from app.solving.facts import GroupFacts, collect_facts_of_views, join_facts
@@ -49,7 +49,7 @@ def facts(keys: str = "abc", noise_px: float = 0.0, seed: int = 0) -> GroupFacts
 
 def found(of: GroupFacts, policy=POLICY, off: float = 0.0) -> ChiSquareResiduals:
     start = np.tile(np.array(BALL) + off, (of.groups, 1))
-    return chi_square_residuals(of, np.ones(len(of.view_group), bool), start, policy)
+    return fit_balls_and_test_residuals(of, np.ones(len(of.view_group), bool), start, policy)
 
 
 class TestResidualsOf:
@@ -93,11 +93,13 @@ class TestResidualsOf:
     def test_one_view_alone_says_nothing(self) -> None:
         three = facts("abc")
         for used in ([True, False, False], [False, False, False]):
-            one = chi_square_residuals(three, np.array(used), np.array([BALL]), POLICY)
+            one = fit_balls_and_test_residuals(three, np.array(used), np.array([BALL]), POLICY)
             assert np.isnan([one.chi_square[0], one.p_value[0], one.point[0, 0]]).all()
 
     def test_without_a_start_nothing_is_said(self) -> None:
-        one = chi_square_residuals(facts(), np.ones(3, bool), np.full((1, 3), np.nan), POLICY)
+        one = fit_balls_and_test_residuals(
+            facts(), np.ones(3, bool), np.full((1, 3), np.nan), POLICY
+        )
         assert np.isnan(one.p_value).all()
 
     @given(st.lists(st.integers(0, 10_000), min_size=1, max_size=6), st.integers(0, 1000))
@@ -108,7 +110,7 @@ class TestResidualsOf:
 
         def residuals_at_ball(of: GroupFacts) -> ChiSquareResiduals:
             judgement = judge_groups(of, policy, CovarianceOfMeanBall(of))
-            return chi_square_residuals(
+            return fit_balls_and_test_residuals(
                 of, find_views_in_pairs(of, judgement.valid), judgement.point, policy
             )
 
@@ -223,7 +225,7 @@ class TestResidualsWithout:
         assert len(rows.chi_square) == used.sum()
         for row, place in enumerate(np.flatnonzero(used)):
             others = used & (np.arange(len(used)) != place)
-            alone = chi_square_residuals(of, others, judgement.point, policy)
+            alone = fit_balls_and_test_residuals(of, others, judgement.point, policy)
             for item in fields(ChiSquareResiduals):
                 one, other = getattr(rows, item.name)[row], getattr(alone, item.name)[0]
                 assert np.array_equal(one, other, equal_nan=True), item.name

@@ -9,7 +9,7 @@ from contextlib import closing
 import pytest
 from sqlalchemy import text
 
-from app.db.dialects.dialect import AGAIN
+from app.db.dialects.dialect import ALL_CHANGED
 from app.db.store import COMMITTED, Store
 from tests.databases import POSTGRESQL
 from tests.unit.db.homes import say
@@ -33,7 +33,7 @@ def words(own_store: Store) -> queue.Queue[str]:
     heard: queue.Queue[str] = queue.Queue()
     own_store.sharing.subscribe(heard.put)
     own_store.subscribe()
-    assert heard.get(timeout=SECONDS) == AGAIN
+    assert heard.get(timeout=SECONDS) == ALL_CHANGED
     return heard
 
 
@@ -96,7 +96,7 @@ class TestWords:
         monkeypatch.setattr("app.db.dialects.postgresql_sharing.AGAIN_SECONDS", 0.01)
         heard = words(other)
         end(own_store, "LISTEN")
-        assert heard.get(timeout=SECONDS) == AGAIN
+        assert heard.get(timeout=SECONDS) == ALL_CHANGED
         own_store.publish("after")
         assert heard.get(timeout=SECONDS) == "after"
 

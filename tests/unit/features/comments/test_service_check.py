@@ -79,4 +79,4 @@ class TestExamineThreads:
             session.execute(text(forged.format(threads[0])))
         check = examine_threads(store)
         assert (check.ok, check.sentence) == (False, f"1 not as the log says: {threads[0]}")
-        assert check.mend == get_dialect(store.settings).restoring
+        assert check.advice == get_dialect(store.settings).restoring

@@ -28,7 +28,7 @@ from app.features.solutions.service import solve_dataset
 from app.features.tables import Base
 from app.features.verdicts.bulk import give_verdicts
 from app.features.webhooks.queries import insert_webhook, read_webhooks
-from app.features.what_if.service import YieldStore
+from app.features.what_if.service import WhatIfStore
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box
 from app.soccer.policy import PAPER
@@ -191,7 +191,7 @@ class TestDeleteDataset:
         assert rows(two, "verdict") == 3
 
     def test_its_yield_is_not_found_any_more(self, two: Store) -> None:
-        yields = YieldStore(two)
+        yields = WhatIfStore(two)
         yields.get_snapshot(1)
         delete_dataset(two, "demo", confirm="demo", actor="eve")
         with pytest.raises(NotFoundError):

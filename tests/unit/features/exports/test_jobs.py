@@ -42,13 +42,13 @@ def age(folder: ExportFolder, entry: ExportEntry, days: int) -> None:
 class TestKeep:
     def test_a_finished_export_is_found_again(self, folder: ExportFolder) -> None:
         entry = keep(folder, "12")
-        assert folder.get("12") == folder.find("12") == entry
+        assert folder.get_entry("12") == folder.find_entry("12") == entry
         assert (entry.counts, entry.left_out, entry.bytes) == ({"cameras": 2}, {"stale": 1}, 22)
         assert entry.missing_images == ["7.png: gone"]
 
     def test_a_zip_without_its_record_is_not_found(self, folder: ExportFolder) -> None:
         folder.get_zip_path("12").write_bytes(b"PK")
-        assert folder.find("12") is None
+        assert folder.find_entry("12") is None
 
 
 class TestExpire:
@@ -58,7 +58,7 @@ class TestExpire:
         for name, days in (("12", 31), ("13", 29)):
             age(folder, keep(folder, name), days)
         assert folder.delete_expired_zips(30) == 1
-        old, young = folder.get("12"), folder.get("13")
+        old, young = folder.get_entry("12"), folder.get_entry("13")
         assert (old.expired, young.expired) == (True, False)
         assert (old.counts, old.bytes) == ({"cameras": 2}, 22)
         assert [folder.get_zip_path(name).exists() for name in ("12", "13")] == [False, True]
@@ -68,7 +68,7 @@ class TestExpire:
         age(folder, keep(folder, "12"), 4000)
         assert folder.delete_expired_zips(0) == 0
         assert folder.get_zip_path("12").exists()
-        assert folder.get("12").find_expiry_time(0) is None
+        assert folder.get_entry("12").find_expiry_time(0) is None
 
     def test_a_zip_whose_deletion_was_interrupted_goes_the_next_time(
         self, folder: ExportFolder
@@ -82,7 +82,7 @@ class TestExpire:
     ) -> None:
         age(folder, replace(keep(folder, "12"), stored="s3://exports/12.zip"), 31)
         assert folder.delete_expired_zips(30) == 0
-        assert folder.get("12").expired is False
+        assert folder.get_entry("12").expired is False
 
     def test_a_record_that_cannot_be_read_keeps_no_other_from_expiring(
         self, folder: ExportFolder
@@ -95,7 +95,7 @@ class TestExpire:
         values = asdict(keep(folder, "12"))
         del values["expired"]
         (folder.folder / "12.json").write_text(json.dumps(values))
-        assert folder.get("12").expired is False
+        assert folder.get_entry("12").expired is False
 
 
 class TestGet:
@@ -104,20 +104,20 @@ class TestGet:
     )
     def test_an_unknown_export_is_not_found(self, folder: ExportFolder, name: str) -> None:
         with pytest.raises(NotFoundError):
-            folder.get(name)
+            folder.get_entry(name)
 
     def test_exports_from_before_there_were_jobs_are_still_there(
         self, folder: ExportFolder
     ) -> None:
         entry = keep(folder, "9b2f0c6e5d7a4c18a3f1e2d4b5c6a798")
-        assert folder.get(entry.id) == entry
+        assert folder.get_entry(entry.id) == entry
 
     def test_a_record_outside_of_the_folder_is_not_reached(self, folder: ExportFolder) -> None:
         keep(folder, "12")
         record = folder.folder / "12.json"
         record.rename(folder.folder.parent / "13.json")
         with pytest.raises(NotFoundError):
-            folder.get("../13")
+            folder.get_entry("../13")
 
 
 class TestForget:
@@ -126,9 +126,9 @@ class TestForget:
         kept = keep(folder, "13")
         for name in ("12", "../exports/13", "99"):
             folder.delete_export(name)
-        assert folder.find("12") is None
+        assert folder.find_entry("12") is None
         assert not folder.get_zip_path("12").exists()
-        assert folder.get("13") == kept
+        assert folder.get_entry("13") == kept
 
 
 class TestWriting:

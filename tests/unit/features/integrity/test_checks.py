@@ -126,7 +126,7 @@ class TestExamineHome:
         assert faults(settings) == {}
         settings.home.chmod(0o755)
         found = faults(settings)["permissions"]
-        assert (found.sentence.startswith("other users can read 2"), found.mend) == (
+        assert (found.sentence.startswith("other users can read 2"), found.advice) == (
             True,
             f"Start touchline serve, or run chmod -R go= {settings.home}",
         )
@@ -136,7 +136,7 @@ class TestExamineHome:
     ) -> None:
         usage = namedtuple("usage", "total used free")(10, 9, 1)
         monkeypatch.setattr(shutil, "disk_usage", lambda _path: usage)
-        assert "at least 1.1 GB" in str(faults(settings)["room"].mend)
+        assert "at least 1.1 GB" in str(faults(settings)["room"].advice)
 
     def test_an_unreadable_anchor_is_named(self, settings: Settings) -> None:
         settings.database_file.with_name("home.json").write_text("{")
@@ -161,7 +161,7 @@ class TestExamineSurroundings:
             session.execute(text("DROP TRIGGER log_refuses_update"))
             session.execute(text("UPDATE log SET at = '2999-01-01T00:00:00+00:00'"))
         found = around(store)["clock"]
-        assert (found.ok, found.mend) == (False, "Set the clock of this machine.")
+        assert (found.ok, found.advice) == (False, "Set the clock of this machine.")
 
     def test_entries_of_a_time_when_the_clock_was_ahead_are_counted(
         self, store: Store, fill, make_group
@@ -188,7 +188,7 @@ class TestExamineSurroundings:
             session.execute(text("INSERT INTO calibration (key, body) VALUES ('k', '')"))
         found = around(there)
         assert found["uploads"].sentence.startswith("1 kept")
-        assert upload.id in str(found["uploads"].mend)
+        assert upload.id in str(found["uploads"].advice)
         assert found["leftovers"].sentence.startswith("1 half-written")
         assert found["unused calibrations"].sentence.startswith("1 that")
         assert all(found[name].ok for name in ("uploads", "leftovers", "unused calibrations"))
@@ -217,4 +217,4 @@ class TestExamineSurroundings:
         found = around(store)
         assert found["uploads"].sentence.startswith("0 kept")
         assert found["recordings"].sentence.startswith("1 indices")
-        assert str(store.settings.recordings / "unknown") in str(found["recordings"].mend)
+        assert str(store.settings.recordings / "unknown") in str(found["recordings"].advice)

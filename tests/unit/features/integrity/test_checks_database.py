@@ -89,7 +89,7 @@ class TestComputed:
         found = faults(store)
         assert found.keys() == {"calibrations"}
         assert found["calibrations"].sentence == f"1 not as it was written: {key}"
-        assert found["calibrations"].mend == restoring
+        assert found["calibrations"].advice == restoring
 
     def test_calibrations_that_were_swapped_are_not_those_that_a_solution_rests_on(
         self, store: Store, ids
@@ -109,7 +109,7 @@ class TestComputed:
         assert found.keys() == {"solutions"}
         sentence = f"1 not as it was written: {number} of group {ids[1]}"
         assert found["solutions"].sentence == sentence
-        assert found["solutions"].mend == restoring
+        assert found["solutions"].advice == restoring
 
     @pytest.mark.parametrize("column", ["body", "summary"])
     def test_solutions_that_were_swapped_are_those_of_neither_group(
@@ -121,7 +121,7 @@ class TestComputed:
         found = faults(store)
         assert found["solutions"].sentence.startswith("2 not as it was written")
         # A queue that was made of these would be as wrong.
-        assert {check.mend for check in found.values()} == {restoring}
+        assert {check.advice for check in found.values()} == {restoring}
 
     def test_a_solution_names_the_calibrations_that_it_rests_on(self, store: Store, ids) -> None:
         turned = json.loads(first(store, "SELECT calibrations FROM solution WHERE id = 1"))[::-1]
@@ -183,7 +183,7 @@ class TestQueue:
         assert found.keys() == {"queue"}
         assert found["queue"].sentence.startswith("1 not as")
         assert found["queue"].sentence.endswith(f": {ids[1]}")
-        assert found["queue"].mend == REBUILD
+        assert found["queue"].advice == REBUILD
         rebuild_tables(store)
         assert faults(store) == {}
 
@@ -201,7 +201,7 @@ class TestQueue:
         assert faults(store) == {}
         (found,) = (check for check in examine_database(store) if check.name == "solutions of demo")
         assert found.sentence == "2 of 2 groups wait to be solved"
-        assert found.mend == 'touchline solve --dataset "demo"'
+        assert found.advice == 'touchline solve --dataset "demo"'
         rebuild_tables(store)
         assert first(store, row) == number
         assert faults(store) == {}
@@ -224,7 +224,7 @@ class TestExamine:
         found = faults(store)
         assert found.keys() == {"groups"}
         assert found["groups"].sentence == f"1 not as the log says: {ids[1]}"
-        assert found["groups"].mend == REBUILD
+        assert found["groups"].advice == REBUILD
         rebuild_tables(store)
         assert faults(store) == {}
 
@@ -242,14 +242,14 @@ class TestExamine:
         change(store, forged.format(group=ids[1], stations=stations_of(ids[1])))
         found = faults(store)["digests"]
         assert f" not of what was said: {named} " in found.sentence
-        assert found.mend == REBUILD
+        assert found.advice == REBUILD
         rebuild_tables(store)
         assert faults(store) == {}
 
     def test_a_verdict_that_was_changed_needs_a_backup(self, store: Store, ids) -> None:
         trigger = "DROP TRIGGER verdict_refuses_update"
         change(store, trigger, f"UPDATE verdict SET actor = 'eve' WHERE group_id = {ids[0]}")
-        assert faults(store)["groups' verdicts"].mend == get_dialect(store.settings).restoring
+        assert faults(store)["groups' verdicts"].advice == get_dialect(store.settings).restoring
 
     @pytest.mark.parametrize(
         ("verb", "forged"),
@@ -270,7 +270,7 @@ class TestExamine:
         change(store, f"DROP TRIGGER dismissal_refuses_{verb}", forged)
         found = faults(store)["dismissed findings"]
         assert found.sentence == f"1 not as the log says: {state.id}"
-        assert found.mend == get_dialect(store.settings).restoring
+        assert found.advice == get_dialect(store.settings).restoring
 
     def test_a_log_that_was_changed_ends_the_comparison(self, store: Store, ids) -> None:
         change(
@@ -284,7 +284,7 @@ class TestExamine:
         self, store: Store, ids
     ) -> None:
         change(store, f"UPDATE station SET lines = '[' WHERE id IN ({stations_of(ids[0])})")
-        assert faults(store)["tables"].mend == REBUILD
+        assert faults(store)["tables"].advice == REBUILD
         rebuild_tables(store)
         assert faults(store) == {}
 
@@ -292,5 +292,5 @@ class TestExamine:
         self, store: Store, fill, make_group
     ) -> None:
         fill(make_group(7), solved=False)
-        (told,) = (check for check in examine_database(store) if check.mend)
-        assert (told.ok, told.mend) == (True, 'touchline solve --dataset "demo"')
+        (told,) = (check for check in examine_database(store) if check.advice)
+        assert (told.ok, told.advice) == (True, 'touchline solve --dataset "demo"')

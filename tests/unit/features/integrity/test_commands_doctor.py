@@ -42,7 +42,7 @@ class TestDoctor:
         assert done.exit_code == 1
         (fault,) = (check for check in json.loads(done.stdout) if not check["ok"])
         mended_by = "touchline restore" if get_dialect(settings).is_file else "pg_restore"
-        assert (fault["name"], mended_by in fault["mend"]) == ("datasets", True)
+        assert (fault["name"], mended_by in fault["advice"]) == ("datasets", True)
 
     def test_rebuilding_waits_for_no_server(self, settings: Settings) -> None:
         assert CliRunner().invoke(app, ["doctor", "--rebuild"]).exit_code == 0
@@ -57,5 +57,5 @@ class TestDoctor:
         done = CliRunner().invoke(app, ["doctor", "--json"])
         assert done.exit_code == 1
         (fault,) = (check for check in json.loads(done.stdout) if not check["ok"])
-        assert (fault["name"], "touchline restore" in fault["mend"]) == ("database", True)
+        assert (fault["name"], "touchline restore" in fault["advice"]) == ("database", True)
         assert settings.database_file.stat().st_size == 0

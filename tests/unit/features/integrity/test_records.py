@@ -133,7 +133,7 @@ class TestExaminePeople:
         wrong = {key: check for key, check in found(team).items() if not check.ok}
         assert set(wrong) == {name}
         assert f"1 not as the log says: {whom}" in wrong[name].sentence
-        assert "restore" in (wrong[name].mend or "")
+        assert "restore" in (wrong[name].advice or "")
 
     def test_the_dataset_of_a_role_is_named_by_its_number(self, team: Store) -> None:
         forge(team, "DELETE FROM dataset_role")

@@ -69,7 +69,7 @@ class TestVersions:
         found = faults(store)
         assert found.keys() == {"frozen versions"}
         assert found["frozen versions"].sentence.endswith("(the log says otherwise)")
-        assert found["frozen versions"].mend == get_dialect(store.settings).restoring
+        assert found["frozen versions"].advice == get_dialect(store.settings).restoring
 
     def test_all_groups_of_a_version_are_there(self, store: Store) -> None:
         change(store, "version_group_refuses_delete", "DELETE FROM version_group")

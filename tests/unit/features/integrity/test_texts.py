@@ -35,4 +35,4 @@ class TestTexts:
         assert found.sentence == (
             f"1 with U+0000, which PostgreSQL cannot keep: groups id={group} column label"
         )
-        assert found.mend == "touchline transfer --replace-null writes U+FFFD there."
+        assert found.advice == "touchline transfer --replace-null writes U+FFFD there."

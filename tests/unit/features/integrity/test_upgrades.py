@@ -64,7 +64,9 @@ def numbers(settings: Settings) -> list[tuple[object, ...]]:
 
 def commands(checks: list[CheckResult]) -> list[list[str]]:
     """Commands of the product that the advice consists of."""
-    advice = [check.mend for check in checks if check.mend and check.mend.startswith("touchline ")]
+    advice = [
+        check.advice for check in checks if check.advice and check.advice.startswith("touchline ")
+    ]
     return [shlex.split(sentence)[1:] for sentence in advice]
 
 

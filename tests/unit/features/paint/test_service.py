@@ -35,7 +35,7 @@ from app.features.solutions.service import list_stale_groups, solve_dataset
 from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.verify import verify_version
 from app.features.what_if.funnel import count_yield
-from app.features.what_if.service import YieldStore
+from app.features.what_if.service import WhatIfStore
 from app.media import files as media
 from app.sample.render import render_view
 from app.sample.scene import Scene
@@ -207,7 +207,7 @@ class TestReadPaint:
 
     def test_a_policy_may_ask_for_agreement_and_what_if_says_what_it_costs(self, painted):
         first, second = sorted(row.agreement for row in list_groups(painted, 1).items)
-        yields = YieldStore(painted)
+        yields = WhatIfStore(painted)
         for asked, passing in ((first, 2), (second, 1), (1.0, 0)):
             found = count_yield(yields, 1, {"min_agreement": asked})
             assert (found.passing, found.needs_solving) == (passing, ())

@@ -68,11 +68,11 @@ class Desk:
         credential = (device or self.device).make(options)
         return self.passkeys.make(login, name, credential, SITE)[1]
 
-    def enter(self, credential: dict[str, Any] | None = None, asker: str = BROWSER) -> str:
+    def enter(self, credential: dict[str, Any] | None = None, browser_token: str = BROWSER) -> str:
         """Who is logged in by what the device signs."""
         if credential is None:
-            credential = self.device.sign(self.passkeys.begin_login(asker, SITE))
-        found = self.logins.find(self.passkeys.log_in(asker, credential, SITE))
+            credential = self.device.sign(self.passkeys.begin_login(browser_token, SITE))
+        found = self.logins.find(self.passkeys.log_in(browser_token, credential, SITE))
         assert found is not None
         return found.name
 

@@ -118,7 +118,7 @@ class TestEvaluate:
         of_half = f"{size.width // 2}x{size.height // 2}"
         words = ("evaluate", "--dataset", "small", "--json")
         options = ("--format", "coco", "--category", "32", "--size", of_half)
-        done = run(*words, str(half), *options, "--careful", str(careful))
+        done = run(*words, str(half), *options, "--reference", str(careful))
         assert done.exit_code == 0, done.output
         document = json.loads(done.stdout)
         assert document["counts"]["careful_boxes"] == len(halves)
@@ -126,8 +126,8 @@ class TestEvaluate:
         rows = {row["name"]: row["cells"][0]["value"] for row in table["rows"]}
         assert rows["detected"] > 0.99
         swapped = run(
-            *words, str(truth), "--careful", str(half), "--careful-format", "coco",
-            "--careful-category", "32", "--careful-size", of_half,
+            *words, str(truth), "--reference", str(half), "--reference-format", "coco",
+            "--reference-category", "32", "--reference-size", of_half,
         )  # fmt: skip
         document = json.loads(swapped.stdout)
         table = next(item for item in document["tables"] if item["name"] == "boxes")

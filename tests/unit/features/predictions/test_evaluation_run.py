@@ -68,7 +68,7 @@ class TestCheck:
         request = SourcesEvaluationRequest(
             EvaluationRequest(), PredictionFiles(Path("a-set")), careful
         )
-        with pytest.raises(InputError, match="--careful-category needs a file of boxes"):
+        with pytest.raises(InputError, match="--reference-category needs a file of boxes"):
             request.refuse_unused_options()
 
     def test_a_version_has_its_own_groups(self) -> None:

@@ -61,7 +61,7 @@ class TestVerifyAndKeep:
     def test_of_a_damaged_database_the_damage_is_told(self, store, version, monkeypatch) -> None:
         def broken(*_arguments, **_options):
             error = DamagedError("touchline.db is damaged")
-            store.note_damage(error)
+            store.record_damage(error)
             raise error
 
         monkeypatch.setattr(verify_module, "verify_version", broken)

@@ -23,7 +23,7 @@ from app.features.people.service import change_person, find_person, give_role, i
 from app.features.verdicts.service import set_verdict
 from app.features.webhooks import sender as module
 from app.features.webhooks.messages import CHOSEN, MessageKind, sign_message
-from app.features.webhooks.sender import AGAIN, WebhookSender
+from app.features.webhooks.sender import RETRY_DELAYS, WebhookSender
 from app.features.webhooks.service import (
     change_webhook,
     list_deliveries,
@@ -169,11 +169,11 @@ class TestTryingAgain:
         send_ping(allowed, "demo", hook, actor="ann")
         assert sender.send_due_messages() == 1
         assert sender.send_due_messages() == 0
-        clock.now += AGAIN[0]
+        clock.now += RETRY_DELAYS[0]
         assert sender.send_due_messages() == 1
         (delivery,) = list_deliveries(allowed, "demo", hook)
         assert delivery.problem == "it answered 302 (redirects are not followed)"
-        clock.now += AGAIN[1]
+        clock.now += RETRY_DELAYS[1]
         assert sender.send_due_messages() == 1
         (delivery,) = list_deliveries(allowed, "demo", hook)
         assert (delivery.state, delivery.attempts, delivery.status) == ("delivered", 3, 204)
@@ -186,7 +186,7 @@ class TestTryingAgain:
     ) -> None:
         receiver.answers, receiver.secret = [500] * 20, None
         send_ping(allowed, "demo", hook, actor="ann")
-        for pause in (*AGAIN, timedelta()):
+        for pause in (*RETRY_DELAYS, timedelta()):
             assert sender.send_due_messages() == 1
             clock.now += pause
         assert sender.send_due_messages() == 0

@@ -22,7 +22,7 @@ from app.features.solutions.service import solve_dataset
 from app.features.what_if import blocks as gathered
 from app.features.what_if.blocks import DatasetBlocks
 from app.features.what_if.funnel import count_yield
-from app.features.what_if.service import YieldStore
+from app.features.what_if.service import WhatIfStore
 from app.soccer.policy import PAPER, CalibrationPolicy
 from tests.waiting import SECONDS
 
@@ -44,7 +44,7 @@ def anew(store: Store, tmp_path: Path):
     """Counts everything from the solutions, whatever was kept."""
 
     def count(values=None):
-        class Elsewhere(YieldStore):
+        class Elsewhere(WhatIfStore):
             def _folder(self, dataset_id: int) -> Path:
                 return tmp_path / "elsewhere"
 
@@ -65,7 +65,7 @@ class TestInStep:
         rng = random.Random(3)
         ids = fill(*(make_group(number, split=rng.choice(SPLITS)) for number in range(7, 14)))
         numbers = dict(zip(ids, range(7, 14), strict=True))
-        yields = YieldStore(store)
+        yields = WhatIfStore(store)
         asked = {"min_jac": 0.9, "max_sigma_m": 0.2, "tau_percent": 0.4}
 
         def edit() -> None:
@@ -100,14 +100,14 @@ class TestInStep:
         for _ in range(14):
             rng.choice([edit, edit, edit, take_back, bring, solve, judge])()
             if rng.random() < 0.3:
-                yields = YieldStore(store)
+                yields = WhatIfStore(store)
             assert count_yield(yields, 1) == anew()
             assert count_yield(yields, 1, asked) == anew(asked)
 
     def test_an_edit_that_is_taken_back_is_seen(self, store, fill, make_group, anew) -> None:
         """Its solution is there from before: none is inserted."""
         (group, *_) = fill(make_group(7), make_group(8))
-        yields = YieldStore(store)
+        yields = WhatIfStore(store)
         etag = load_group_state(store, group).etag
         etag = submit_edit(
             store, group, make_set_ball_edit("7.png", None), if_match=etag, actor="ann"
@@ -119,7 +119,7 @@ class TestInStep:
 
     def test_another_calibration_begins_anew(self, store, fill, make_group, anew) -> None:
         fill(*(make_group(number) for number in range(7, 12)))
-        yields = YieldStore(store)
+        yields = WhatIfStore(store)
         assert count_yield(yields, 1).unsolved == 0
         other = replace(PAPER, calibration=CalibrationPolicy(robust_scale_px=3.0))
         change_policy(store, "demo", other, if_match=None, actor="ann")
@@ -130,7 +130,7 @@ class TestInStep:
     def test_groups_that_went_without_a_mark_are_seen(self, store, fill, make_group, anew) -> None:
         """As when the log is replayed, which says everything anew: at the next change of any."""
         (group, *_) = fill(*(make_group(number) for number in range(7, 12)))
-        yields = YieldStore(store)
+        yields = WhatIfStore(store)
         yields.get_snapshot(1).blocks[0].block.__dict__["groups"] = 2
         submit_edit(
             store,
@@ -145,33 +145,33 @@ class TestInStep:
 class TestAfterARestart:
     def test_no_solution_is_read_again(self, store, fill, make_group, monkeypatch) -> None:
         fill(*(make_group(number) for number in range(7, 12)))
-        before = count_yield(YieldStore(store), 1)
+        before = count_yield(WhatIfStore(store), 1)
         monkeypatch.setattr("app.features.what_if.blocks.read_tables", None)
-        assert count_yield(YieldStore(store), 1) == before
+        assert count_yield(WhatIfStore(store), 1) == before
 
     def test_what_was_judged_is_not_judged_again(
         self, store, fill, make_group, monkeypatch
     ) -> None:
         fill(*(make_group(number) for number in range(7, 12)))
-        before = count_yield(YieldStore(store), 1)
+        before = count_yield(WhatIfStore(store), 1)
         monkeypatch.setattr("app.features.what_if.block_results.judge_groups", None)
-        assert count_yield(YieldStore(store), 1) == before
+        assert count_yield(WhatIfStore(store), 1) == before
 
     @pytest.mark.parametrize("name", ["table.json", "*.facts", "*.judged", "bare.heads"])
     def test_a_damaged_file_is_made_again(self, store, fill, make_group, name: str) -> None:
         fill(*(make_group(number) for number in range(7, 12)))
-        before = count_yield(YieldStore(store), 1)
+        before = count_yield(WhatIfStore(store), 1)
         for damage in (lambda old: b"", lambda old: old[: len(old) // 2], lambda old: b"x" * 500):
             path = sorted(folder(store).glob(name))[0]
             whole = path.read_bytes()
             path.unlink()
             path.write_bytes(damage(whole))
-            assert count_yield(YieldStore(store), 1) == before
+            assert count_yield(WhatIfStore(store), 1) == before
 
     def test_a_table_of_another_database_is_not_used(self, store, fill, make_group) -> None:
         """As after a restored backup, whose changes have the numbers of others."""
         fill(*(make_group(number) for number in range(7, 12)))
-        count_yield(YieldStore(store), 1)
+        count_yield(WhatIfStore(store), 1)
         path = folder(store) / "table.json"
         kept = json.loads(path.read_text())
         with store.read() as session:
@@ -185,11 +185,11 @@ class TestAfterARestart:
         fill(*(make_group(number) for number in range(7, 12)))
         store.settings.yields.parent.mkdir(exist_ok=True)
         store.settings.yields.write_text("")
-        assert count_yield(YieldStore(store), 1).passing == 5
+        assert count_yield(WhatIfStore(store), 1).passing == 5
 
     def test_no_file_is_left_behind(self, store, fill, make_group) -> None:
         ids = fill(*(make_group(number) for number in range(7, 13)))
-        yields = YieldStore(store)
+        yields = WhatIfStore(store)
         count_yield(yields, 1)
         for group, number in zip(ids, range(7, 13), strict=True):
             change = make_set_ball_edit(f"{number}.png", None)
@@ -208,7 +208,7 @@ class TestHowFarItIs:
     ) -> None:
         fill(*(make_group(number) for number in range(7, 12)))
         monkeypatch.setattr("app.features.what_if.service.AT_ONCE", 4)
-        yields = YieldStore(store)
+        yields = WhatIfStore(store)
         with pytest.raises(
             OverloadedError,
             match="the yield is being counted: 0 groups are read, about 5 are left",
@@ -236,13 +236,13 @@ class TestHowFarItIs:
 
         monkeypatch.setattr(gathered, "read_tables", killed)
         with pytest.raises(KeyboardInterrupt):
-            YieldStore(store).update_table(1)
+            WhatIfStore(store).update_table(1)
         monkeypatch.setattr(
             gathered,
             "read_tables",
             lambda session, rows: taken.extend(row.group_id for row in rows) or read(session, rows),
         )
-        found = count_yield(YieldStore(store), 1)
+        found = count_yield(WhatIfStore(store), 1)
         assert np.unique(taken[:6]).tolist() == ids[:6]
         assert not set(taken[9:]) & set(ids[:6])
         assert found == anew()

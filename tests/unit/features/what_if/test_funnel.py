@@ -18,7 +18,7 @@ from app.features.policies.service import change_policy
 from app.features.queue.service import list_groups
 from app.features.solutions.service import solve_dataset
 from app.features.what_if.funnel import WITHOUT_EFFECT, Yield, count_yield
-from app.features.what_if.service import YieldStore
+from app.features.what_if.service import WhatIfStore
 from app.features.what_if.table import YieldTable
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
@@ -124,7 +124,7 @@ class TestJudgeTable:
     @pytest.mark.parametrize("seed", range(SEEDS))
     def test_judges_as_solve_does(self, filled, solutions, seed: int) -> None:
         policy = random_policy(seed)
-        table = YieldStore(filled).get_snapshot(1).table
+        table = WhatIfStore(filled).get_snapshot(1).table
         judged = judge_table(table, policy)
         assert table.groups == len(solutions)
         for place, (group, old) in enumerate(solutions):
@@ -146,7 +146,7 @@ class TestJudgeTable:
     def test_the_policies_of_this_test_let_something_through_and_stop_something(
         self, filled
     ) -> None:
-        table = YieldStore(filled).get_snapshot(1).table
+        table = WhatIfStore(filled).get_snapshot(1).table
         found = np.concatenate(
             [judge_table(table, random_policy(n)).first_failed_gates for n in range(SEEDS)]
         )
@@ -188,7 +188,7 @@ class TestJudgeTable:
 
     def test_sigma_is_that_of_the_solution(self, filled, solutions) -> None:
         """The gate at the very value, a billionth to either side."""
-        table = YieldStore(filled).get_snapshot(1).table
+        table = WhatIfStore(filled).get_snapshot(1).table
         policy = replace(PAPER, click_sigma_px=2.0, box_sigma_share=0.1)
         for place, (group, old) in enumerate(solutions):
             ball = solved_again(group, old, policy).ball
@@ -200,7 +200,7 @@ class TestJudgeTable:
 
     def test_the_p_value_is_that_of_the_solution(self, filled, solutions) -> None:
         """The gate at the very value, a billionth to either side."""
-        table = YieldStore(filled).get_snapshot(1).table
+        table = WhatIfStore(filled).get_snapshot(1).table
         policy = replace(PAPER, click_sigma_px=0.5)
         tested = 0
         for place, (group, old) in enumerate(solutions):
@@ -214,7 +214,7 @@ class TestJudgeTable:
         assert tested > 3
 
     def test_jac_is_that_of_the_calibrations(self, filled, solutions) -> None:
-        table = YieldStore(filled).get_snapshot(1).table
+        table = WhatIfStore(filled).get_snapshot(1).table
         for place, gamma in enumerate((0.5, 1.0, 2.0)):
             stored = [
                 view.calibration.jac[place] if view.calibration.jac else np.nan
@@ -254,7 +254,7 @@ def counted(found: Yield) -> None:
 
 class TestGetYield:
     def test_counts_telescope_and_agree_with_the_queue(self, filled, solutions) -> None:
-        found = count_yield(YieldStore(filled), 1)
+        found = count_yield(WhatIfStore(filled), 1)
         counted(found)
         assert found.passing == list_groups(filled, 1, "passes:yes").total > 0
         for step in found.funnel:
@@ -268,7 +268,7 @@ class TestGetYield:
     def test_what_if_counts_what_is_gained_and_lost(self, filled, solutions, seed: int) -> None:
         policy = random_policy(seed)
         values = {name: getattr(policy, name) for name in ("min_jac", "tau_percent", "max_sigma_m")}
-        found = count_yield(YieldStore(filled), 1, values)
+        found = count_yield(WhatIfStore(filled), 1, values)
         counted(found)
         asked = replace(PAPER, **values)
         after = [solved_again(group, old, asked).passes for group, old in solutions]
@@ -278,7 +278,7 @@ class TestGetYield:
         assert found.lost == sum(a and not b for a, b in zip(before, after, strict=True))
 
     def test_curves_are_the_papers_figure_3(self, filled, solutions) -> None:
-        found = count_yield(YieldStore(filled), 1)
+        found = count_yield(WhatIfStore(filled), 1)
         assert [curve.gamma_percent for curve in found.curves] == [0.5, 1.0, 2.0]
         for place, curve in enumerate(found.curves):
             for threshold in (0, 50, 75, 90, 100):
@@ -299,7 +299,7 @@ class TestGetYield:
 
     def test_findings_follow_their_thresholds(self, filled, solutions) -> None:
         values = {"max_height_m": 1.0, "low_parallax_degrees": 30.0, "outside_pitch_m": -10.0}
-        found = count_yield(YieldStore(filled), 1, values)
+        found = count_yield(WhatIfStore(filled), 1, values)
         again = [solved_again(group, old, replace(PAPER, **values)) for group, old in solutions]
         assert found.findings
         for part in found.findings:
@@ -317,7 +317,7 @@ class TestGetYield:
             for key, place in places.items()
         )
         fill(Group("high", views))
-        found = count_yield(YieldStore(store), 1)
+        found = count_yield(WhatIfStore(store), 1)
         (part,) = [part for part in found.findings if part.name == "implausible_ball"]
         assert (part.groups, part.passing) == (1, 1)
         assert list_groups(store, 1, "finding:implausible_ball").total == 1
@@ -329,19 +329,19 @@ class TestGetYield:
             for view in bare.views
         )
         fill(replace(bare, key="11", views=views), make_static(10))
-        found = count_yield(YieldStore(store), 1, {"min_jac": 1.0})
+        found = count_yield(WhatIfStore(store), 1, {"min_jac": 1.0})
         assert found.given_not_measured == 1
         assert found.passing == 1
 
     def test_a_match_in_two_splits_is_a_leak(self, store, fill, make_group) -> None:
         test = replace(make_group(9), match="another", split="test", key="another/9.png")
         fill(make_group(7), make_group(8, split="test"), make_group(10), test)
-        (leak,) = count_yield(YieldStore(store), 1).leakage
+        (leak,) = count_yield(WhatIfStore(store), 1).leakage
         assert leak.match == make_group(7).match
         assert leak.splits == (("test", 1), ("train", 2))
 
     def test_thresholds_that_need_solving_are_named_and_left_as_they_are(self, filled) -> None:
-        yields = YieldStore(filled)
+        yields = WhatIfStore(filled)
         values = {"calibration": {"check_labels": False}, "min_jac": 0.5, "ball_diameter_m": 0.3}
         found = count_yield(yields, 1, values)
         assert found.needs_solving == ("calibration.check_labels",)
@@ -360,19 +360,19 @@ class TestGetYield:
 
     def test_an_empty_dataset_yields_nothing(self, store) -> None:
         ensure_dataset(store, "demo", "ann")
-        found = count_yield(YieldStore(store), 1)
+        found = count_yield(WhatIfStore(store), 1)
         counted(found)
         assert found.groups == 0
 
     def test_an_unknown_dataset_is_not_found(self, store) -> None:
         with pytest.raises(NotFoundError):
-            count_yield(YieldStore(store), 9)
+            count_yield(WhatIfStore(store), 9)
 
 
 class TestYieldStore:
     def test_unsolved_groups_are_the_first_step(self, store, fill, make_group) -> None:
         fill(make_group(7), make_group(8), solved=False)
-        yields = YieldStore(store)
+        yields = WhatIfStore(store)
         found = count_yield(yields, 1)
         counted(found)
         assert (found.funnel[0].gate, found.funnel[0].dropped, found.unsolved) == ("unsolved", 2, 2)
@@ -381,7 +381,7 @@ class TestYieldStore:
 
     def test_an_edit_is_seen_and_an_undo_too(self, store, fill, make_group) -> None:
         ids = fill(make_group(7), make_group(8), make_group(9))
-        yields = YieldStore(store)
+        yields = WhatIfStore(store)
         assert count_yield(yields, 1).passing == 3
         state = load_group_state(store, ids[1])
         state = submit_edit(
@@ -397,12 +397,12 @@ class TestYieldStore:
             actor="b",
         )
         assert count_yield(yields, 1).passing == 1
-        fresh = count_yield(YieldStore(store), 1)
+        fresh = count_yield(WhatIfStore(store), 1)
         assert fresh == count_yield(yields, 1)
 
     def test_a_new_policy_needs_no_solution_to_be_answered(self, store, fill, make_group) -> None:
         fill(make_group(7), make_group(8))
-        yields = YieldStore(store)
+        yields = WhatIfStore(store)
         before = yields.get_snapshot(1)
         narrow = replace(PAPER, min_parallax_degrees=5.0, max_sigma_m=1e-6)
         change_policy(store, "demo", narrow, if_match=None, actor="ann")
@@ -414,7 +414,7 @@ class TestYieldStore:
         assert count_yield(yields, 1).unsolved == 2
 
     def test_nothing_is_read_again_while_nothing_changes(self, filled) -> None:
-        yields = YieldStore(filled)
+        yields = WhatIfStore(filled)
         assert yields.get_snapshot(1) is yields.get_snapshot(1)
 
     def test_the_oldest_table_goes_when_memory_is_short(
@@ -423,7 +423,7 @@ class TestYieldStore:
         fill(make_group(7))
         import_groups(store, "other", [make_group(8)], source="test", actor="ann")
         solve_dataset(store, "other")
-        yields = YieldStore(store)
+        yields = WhatIfStore(store)
         first = yields.get_snapshot(get_dataset(store, "demo").id)
         monkeypatch.setattr("app.features.what_if.service.MAX_BYTES", first.nbytes)
         yields.get_snapshot(get_dataset(store, "other").id)

@@ -50,7 +50,7 @@ def test_a_column_with_another_bit_is_found_and_named(settings: Settings, array:
     check = examine_yield_cache(settings)
     assert not check.ok
     assert "ab.facts" in check.sentence
-    assert str(settings.yields) in (check.mend or "")
+    assert str(settings.yields) in (check.advice or "")
 
 
 def test_a_file_that_is_cut_short_is_found(settings: Settings) -> None:
