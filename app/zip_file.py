@@ -86,7 +86,9 @@ def open_nested(
         return _open_zip_of_part(file.restrict_to_part(start, member.file_size))
     if not isinstance(path, Path):
         # To reach a member of it, all of it would have to be fetched.
-        raise zipfile.BadZipFile("is a zip compressed inside another; put it there by itself")
+        raise zipfile.BadZipFile(
+            "is a zip compressed inside another zip: unpack it and use it by itself"
+        )
     with tempfile.TemporaryFile() as unpacked:
         total = 0
         with archive.open(member) as packed:

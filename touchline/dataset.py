@@ -56,7 +56,7 @@ class Dataset:
         """
         if not self._export.lists(name):
             raise DataError(
-                f"{self._export.files.path} holds no {name}",
+                f"{self._export.files.path} contains no {name}",
                 "Accept tracks, freeze a version, and export it with --format parquet.",
             )
         pyarrow, parquet = package("pyarrow"), package("pyarrow.parquet")

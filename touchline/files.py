@@ -68,7 +68,7 @@ class Files:
         try:
             return self._zip.read(name) if self._zip else (self.path / name).read_bytes()
         except (KeyError, FileNotFoundError):
-            raise DataError(f"{self.path} holds no {name}") from None
+            raise DataError(f"{self.path} contains no {name}") from None
         except (OSError, zipfile.BadZipFile, RuntimeError, zlib.error) as error:
             raise DataError(f"{name} of {self.path} cannot be read ({error})") from None
 

@@ -275,7 +275,7 @@ def _parse_json_documents(tree: FileTree, path: Path, report: ReaderReport) -> D
         else:
             other = f"{describe_document(value)}; {_RESULTS}"
     if not found:
-        problem = other or "holds no COCO results"
+        problem = other or "contains no COCO results"
         raise DatasetFormatError(str(path), None, None, problem)
     return found
 
@@ -425,7 +425,7 @@ def _read_yolo(tree: FileTree, path: Path, run: PredictionCollector) -> None:
         if name.lower().endswith(".txt") and PurePosixPath(name).name.lower() not in _NOT_LABELS
     ]
     if not names:
-        raise DatasetFormatError(str(path), None, None, "holds no text files")
+        raise DatasetFormatError(str(path), None, None, "contains no text files")
     rows: list[tuple[str, int, NamedFrame | None, list[str]]] = []
     for name in names:
         shown = tree.shown(name)

@@ -90,7 +90,7 @@ def read_table(tree: FileTree, path: Path, run: PredictionCollector, limits: Imp
         names = [name for name in texts if is_mot_text(tree.read_bytes(name))]
     if len(names) != 1:
         what = "no CSV file" if not names else f"{len(names)} CSV files; give exactly one"
-        raise DatasetFormatError(str(path), None, None, f"holds {what}")
+        raise DatasetFormatError(str(path), None, None, f"contains {what}")
     shown = tree.shown(names[0])
     columns: list[str] | None = None
     for line, cells in _read_rows(tree.read_bytes(names[0]), shown, limits):
@@ -275,7 +275,7 @@ def read_tracks(
     folders = [str(PurePosixPath(name).parent) for name in names]
     if not names or len(set(folders)) < len(folders):
         what = "no ball.csv" if not names else "several tables of balls in one folder"
-        raise DatasetFormatError(str(path), None, None, f"holds {what}")
+        raise DatasetFormatError(str(path), None, None, f"contains {what}")
     found = {}
     for name, folder in zip(names, folders, strict=True):
         balls = _PredictedTrackBuilder()

@@ -167,14 +167,14 @@ class CocoCategories:
             return
         if taken:
             names = " or ".join(item.shown for item in taken[:_SHOWN])
-            sentence = f"the file brings no ball: no annotation that can be read has {names}"
+            sentence = f"the file contains no ball: no annotation that can be read has {names}"
         elif not self._all:
-            sentence = "the file brings no ball: it has no categories"
+            sentence = "the file contains no ball: it has no categories"
         else:
             names = ", ".join(item.shown for item in self._all[:_SHOWN])
             more = len(self._all) - _SHOWN
             names += f" and {more} more" if more > 0 else ""
-            sentence = f"the file brings no ball: none of its categories ({names}) is taken for it"
+            sentence = f"the file contains no ball: none of its categories ({names}) is recognised as the ball"
             sentence += f"; {HOW}"
         if alone:
             self._report.add_problem_at(self._path, None, "categories", sentence)

@@ -206,7 +206,7 @@ def _read_lens(reader: _CameraFieldReader) -> tuple[str, tuple[float, ...]]:
         return BROWN_CONRADY, (k1, k2, *tangential, k3, k4, k5, k6, *prism)
     if not isinstance(name, str) or name not in LENSES:
         raise reader.make_field_error(
-            LENS, f"is {quote_text(str(name), 40)}; lenses are {_list_lens_names()}"
+            LENS, f"must be {_list_lens_names()}, not {quote_text(str(name), 40)}"
         )
     for other, count in _DISTORTION:
         if any(reader.read_distortion(other, count)):

@@ -100,7 +100,7 @@ def read_cameras(
                 str(path),
                 None,
                 None,
-                f"holds no camera files ({_ENDINGS}), but {_format_first_suffixes(endings)}",
+                f"contains no camera files ({_ENDINGS}), but {_format_first_suffixes(endings)}",
             )
         places = _map_camera_files_to_original_frames(tree, names)
         cameras = read_camera_files(tree, files, report, places, limits, sizes, covariances)

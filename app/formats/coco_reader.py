@@ -105,7 +105,7 @@ def read_coco(
         _report_ball_categories(files, report)
         if not files:
             report.add_problem_at(
-                str(root), None, None, "holds no COCO file (images and annotations)"
+                str(root), None, None, "contains no COCO file (images and annotations)"
             )
 
 
@@ -125,7 +125,7 @@ def _read_coco_file(
             return value
         report.add_problem_at(shown, None, None, describe_document(value))
         return None
-    report.add_remark(f"{shown}: is no COCO file (it has no list of images) and was not read")
+    report.add_remark(f"{shown}: is not a COCO file (it has no list of images) and was not read")
     return None
 
 

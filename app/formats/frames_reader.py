@@ -104,7 +104,7 @@ def read_frames(
                 report.add_problem_at(tree.shown(name), None, None, IS_VIDEO)
             elif not is_system_file(name):
                 report.add_problem_at(
-                    tree.shown(name), None, None, "is no JPEG, PNG or WebP picture"
+                    tree.shown(name), None, None, "is not a JPEG, PNG or WebP picture"
                 )
         groups = _group_by_name(pictures, grouping, pattern)
         if grouping and pictures:
@@ -115,7 +115,7 @@ def read_frames(
                 label = PurePosixPath(key).name
                 yield Group(key, tuple(views), label=f"Image {label}" if names == [key] else label)
         if not pictures and not report.problems:
-            report.add_problem_at(str(root), None, None, "holds no picture (JPEG, PNG or WebP)")
+            report.add_problem_at(str(root), None, None, "contains no picture (JPEG, PNG or WebP)")
 
 
 def _group_by_name(

@@ -102,7 +102,7 @@ def read_gamestate(
         names = tree.names()
         files = [name for name in names if PurePosixPath(name).name == LABELS]
         if not files:
-            report.add_problem_at(str(root), None, None, f"holds no {LABELS}")
+            report.add_problem_at(str(root), None, None, f"contains no {LABELS}")
         seen: dict[tuple[str, str], str] = {}
         stems: dict[str, set[str]] = {}
         for name in files:

@@ -112,8 +112,8 @@ MAX_FILES = 40
 """Files of which the beginning is read."""
 HEAD_BYTES = 64 * 1024
 CONVERT = f"Touchline does not import that; {EXPORT}"
-YOLO = f"they hold no cameras and no groups; {EXPORT}, or give predictions to {EVALUATE}"
-NO_PLACES = "it holds no places in pictures"
+YOLO = f"they contain no cameras and no groups; {EXPORT}, or give predictions to {EVALUATE}"
+NO_PLACES = "it contains no positions in pictures"
 PREDICTED = f"it holds predictions, not annotations; give it to {EVALUATE}"
 
 

@@ -63,7 +63,7 @@ def open_issia_3d(
         names = tree.names()
         tables = [name for name in names if PurePosixPath(name).name == TABLE_3D]
         if not tables:
-            report.add_problem_at(str(folder), None, None, f"holds no {TABLE_3D}")
+            report.add_problem_at(str(folder), None, None, f"contains no {TABLE_3D}")
         for name in tables[1:]:
             report.add_problem_at(
                 tree.shown(name), None, None, f"is a second {TABLE_3D}; {tables[0]} is used"

@@ -245,7 +245,7 @@ def _read_viper_videos(
                 tree.shown(name), None, None, "is XML of another kind than XGTF; left out"
             )
     if not files:
-        report.add_problem_at(str(tree.path), None, None, "holds no XGTF file")
+        report.add_problem_at(str(tree.path), None, None, "contains no XGTF file")
     for name in files:
         shown, stem = tree.shown(name), re.sub(r"(?i)\.\w+(\.gz)?$", "", PurePosixPath(name).name)
         for camera, track in _assign_videos_to_cameras(
@@ -264,7 +264,7 @@ def _read_viper_videos(
                 found.tracks[camera] = _shift_frames(track, options.get_frame_offset(camera))
                 _report_size_difference(camera, track, shown, options, report)
                 if not track.balls:
-                    report.add_remark(f"{shown} brings no ball for camera {camera}.")
+                    report.add_remark(f"{shown} contains no ball for camera {camera}.")
 
 
 def _assign_videos_to_cameras(

@@ -305,7 +305,7 @@ def read_parquet(
         names = tree.names()
         tables = [name for name in names if name.lower().endswith(".parquet")]
         if not tables:
-            report.add_problem_at(str(root), None, None, "holds no Parquet file")
+            report.add_problem_at(str(root), None, None, "contains no Parquet file")
         groups = GroupAssembler(report)
         for name in tables:
             for view in _read_views(tree, name, names, report, limits):

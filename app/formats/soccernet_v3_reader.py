@@ -51,7 +51,7 @@ def read_soccernet_v3(
         names = tree.names()
         folders = [name[: -len(LABELS)] for name in names if PurePosixPath(name).name == LABELS]
         if not folders:
-            report.add_problem_at(str(root), None, None, f"holds no {LABELS}")
+            report.add_problem_at(str(root), None, None, f"contains no {LABELS}")
         reader = MatchReader(tree, names, report, limits)
         for folder in folders:
             yield from reader.read_match(folder)
@@ -184,7 +184,9 @@ class _MatchLabelsReader:
             for replay in self._find_linked_replays(action, record):
                 if replay not in self.replays:
                     self.report_problem(
-                        action, "linked_replays", f"names {replay}, which is not there"
+                        action,
+                        "linked_replays",
+                        f"names {replay}, which this file does not contain",
                     )
                 elif replay in owner:
                     where = f"names {replay}, which already belongs to {owner[replay]}"
@@ -212,7 +214,11 @@ class _MatchLabelsReader:
         if isinstance(action, str) and action in links:
             links[action].append(replay)
         elif isinstance(action, str):
-            self.report_problem(replay, "linked_action", f"names {action[:80]}, which is not there")
+            self.report_problem(
+                replay,
+                "linked_action",
+                f"names the action {action[:80]}, which this file does not contain",
+            )
         else:
             self.report_problem(
                 replay, "linked_action", "is missing, and no action links this replay"

@@ -171,7 +171,7 @@ class RecordFieldReader:
         key = self.read_path_safe_text("view")
         calibration = self.read_short_text("calibration", "given")
         if calibration not in CALIBRATIONS:
-            raise self.make_field_error("calibration", f"is none of {' and '.join(CALIBRATIONS)}")
+            raise self.make_field_error("calibration", f"must be one of {', '.join(CALIBRATIONS)}")
         given, (lines, not_visible) = self.value.get("given"), self.read_lines()
         station = Station(
             key=self.read_path_safe_text("station"),

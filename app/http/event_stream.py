@@ -90,9 +90,9 @@ class AssignedGroupEvent(BaseModel):
 
 
 class MaintenanceEvent(BaseModel):
-    """The notice of maintenance is another one."""
+    """The maintenance notice was changed or removed."""
 
-    banner: Banner | None = Field(description="Null: it was taken away.")
+    banner: Banner | None = Field(description="Null: it was removed.")
 
 
 EVENTS: dict[str, type[BaseModel]] = {

@@ -193,9 +193,9 @@ class SharedProcessMetrics:
 
 
 def _stream_metrics(counts: ListenerCounts) -> Iterator[Metric]:
-    yield _make_gauge("event_streams", "Windows that listen for events.", counts.open)
+    yield _make_gauge("event_streams", "Open event streams.", counts.open)
     ended = {"opened": counts.opened, "resumed": counts.resumed, "lost": counts.lost}
-    text = "Event streams that were opened, came back, or were let go for being too slow."
+    text = "Event streams that were opened, resumed, or closed because the client was too slow."
     yield _make_labelled_counter("event_stream", text, "what", ended)
 
 

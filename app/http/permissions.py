@@ -276,7 +276,7 @@ def _require_roles(subject: RequestSubject, owned: list[OwnedMention], login: Lo
             whole = item.mention.named.kind in WHOLE or permission.whole
             if whole and item.ownership.dataset in roles.blind:
                 raise ForbiddenError(
-                    "you annotate copies of groups of this dataset without seeing the originals",
+                    "you annotate groups of this dataset independently, so its numbers are hidden from you",
                     hint="Numbers over all its groups are shown once the batch is closed.",
                 )
 

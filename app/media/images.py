@@ -73,7 +73,7 @@ def read_header(data: bytes, name: str = "the image") -> ImageHeader:
             exif = b"" if kind == WEBP else image.info.get("exif", b"")
     except _BROKEN as error:
         known = data.startswith((b"\xff\xd8\xff", b"\x89PNG", b"RIFF"))
-        problem = "is damaged in its header" if known else "is no JPEG, PNG or WebP image"
+        problem = "is damaged in its header" if known else "is not a JPEG, PNG or WebP image"
         raise ImageError(f"{name} {problem}") from error
     orientation = _read_exif_orientation(exif)
     if orientation in SIDEWAYS:

@@ -70,7 +70,7 @@ def strip_and_check_note(note: str | None) -> str | None:
     note = (note or "").strip() or None
     if note is not None and len(note) > MAX_NOTE:
         raise InputError(
-            f"a note has at most {MAX_NOTE:,} characters, and this one has {len(note):,}",
+            f"the note has {len(note):,} characters; the limit is {MAX_NOTE:,}",
             pointer="/note",
         )
     return note

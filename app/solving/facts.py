@@ -407,7 +407,7 @@ def facts_from_bytes(contents: Sequence[bytes]) -> GroupFacts:
             [np.frombuffer(zlib.decompress(part), _NUMBERS) for part in contents]
         )
     except (ValueError, zlib.error) as error:
-        sentence = "the facts beside a solution are not what was written"
+        sentence = "the stored numbers of a solution are damaged"
         raise DamagedError(sentence, hint=EXAMINE) from error
 
 

@@ -144,4 +144,4 @@ def _describe_json_problem(error: str) -> str:
         return "a variable TOUCHLINE_... should hold JSON, and does not"
     several = isinstance(Settings.model_fields[found[1]].get_default(), list)
     example = '["ONE", "ANOTHER"]' if several else '{"NAME": {...}}'
-    return f"TOUCHLINE_{found[1].upper()} is no JSON; write it as {example}"
+    return f"TOUCHLINE_{found[1].upper()} is not JSON; write it as {example}"

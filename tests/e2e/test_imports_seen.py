@@ -215,7 +215,7 @@ class TestImportOfForeignCoco:
         page = open_page("/import")
         bring_in(page, things, "things")
         report = page.get_by_role("region", name="What happened")
-        expect(report).to_contain_text('none of its categories ("thing") is taken for it')
+        expect(report).to_contain_text('none of its categories ("thing") is recognised as the ball')
         expect(report).to_contain_text("is 99, which no image of the file has")
         page.get_by_label("Category of the ball").fill("Thing")
         page.get_by_role("button", name="Import", exact=True).click()

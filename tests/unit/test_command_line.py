@@ -361,7 +361,7 @@ class TestExport:
         command = ("export", "--dataset", "s", "--format", "soccernet-v3", "--all", out)
         code, told, err = run(*command, "--images", "copy")
         assert code == 0, err
-        assert re.search(r"\n  .*, (\w+\.png): frame \1 is no JPEG, PNG or WebP image\n", told)
+        assert re.search(r"\n  .*, (\w+\.png): frame \1 is not a JPEG, PNG or WebP image\n", told)
         assert str(tree) not in told
 
     def test_a_word_that_is_no_choice_is_told_with_those_that_are(

@@ -34,7 +34,7 @@ PLAIN_WORDS = """
     differences dismissals distance documents drags drawing durable editor empty enrol equations
     errors estimates estimator evaluate event events executors expected export exports facets facts faults
     fields figure figures files film filter finder first fit fixture follow followed form format formats
-    frozen gestures give glossary gold grass grid guess guide guideline guidelines header headers
+    frozen gestures glossary gold grass grid guess guide guideline guidelines header headers
     heat help histograms history hit home hooks idempotency identity if image images import imports
     index indexing init insert insight invitation invitations invite items jaccard join json kept
     kernels key keys known konva last latest lazy lease leases least legend lens lesson lessons
@@ -45,7 +45,7 @@ PLAIN_WORDS = """
     pages paint palette panel parquet parse parts path pen people permissions pins pitch pitches
     pixel place places play playback player pointer policies pool popover position postgresql
     preopen preview problem process profile progress proof property proposal propose props provider
-    queries query quota rail ranking rater reader reasons record refresh reimport remote render repeats
+    queries query quota rail ranking rater reader reasons reassign record refresh reimport remote render repeats
     report requests resect resource restore result return revert reviewers rights roles router sentences
     routes row rows rules run runner running runs safe save scale scene scene3d scenes schemas
     scores scoring scroll search sender sending sequence serve server service session sets shared sharing

@@ -337,7 +337,7 @@ def _parse_psycopg_url(url: str) -> URL:
         # Without its cause, which repeats what it was given.
         del error
     raise InputError(
-        "TOUCHLINE_DATABASE_URL is no URL",
+        "TOUCHLINE_DATABASE_URL is not a URL",
         hint="Write it as postgresql://USER:PASSWORD@HOST/DATABASE; characters such as @ and / in"
         " the password are written as %40 and %2F.",
     )

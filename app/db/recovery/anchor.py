@@ -29,12 +29,10 @@ from app.json_text import json_text
 ANCHOR_BYTES = 512
 AGAIN_SECONDS = 0.01
 """A reader beside a writer may see half of an anchor: after so long it is read once more."""
-RESTORE = (
-    "Run touchline restore BACKUP; touchline restore {file} goes on with what that file holds."
-)
+RESTORE = "Run touchline restore BACKUP, or touchline restore {file} to continue with the content of that file."
 RESTORE_SERVER = (
-    "Restore it with pg_restore, or let TOUCHLINE_DATABASE_URL name the database of this home. Where"
-    " it is the right one all the same, move home.json away."
+    "Restore it with pg_restore, or let TOUCHLINE_DATABASE_URL name the database of this home. If"
+    " it is the right one, move home.json away."
 )
 
 

@@ -330,10 +330,10 @@ def _file_size(path: Path) -> int:
 
 
 MOVED = (
-    "Stop the server and put the file that was moved back into its place: with the -wal that lies there"
-    " it has the newest changes. Where it was deleted, restore the newest backup."
+    "Stop the server and move the database file back to its place: with the -wal file there"
+    " it has the newest changes. If the file was deleted, restore the newest backup."
 )
-LOG_MOVED = "Stop the server before anything else opens the database: what was saved goes into its file then."
+LOG_MOVED = "Stop the server before another program opens the database: the server then writes its changes into the file."
 
 
 class OpenDatabaseFile:

@@ -215,7 +215,11 @@ def compare_or_adopt_submission(
         return compare_submitted_annotations(store, annotation.group_id, annotation.batch_id, paint)
     except ReviewError as error:
         # It is tried again with the person's next group, and when the server starts.
-        log.warning("a submitted annotation waits to be taken over", copy=copy_id, error=str(error))
+        log.warning(
+            "a submitted annotation was not applied to its group yet",
+            copy=copy_id,
+            error=str(error),
+        )
         return None
 
 

@@ -122,7 +122,7 @@ def gold(
     from app.features.independent_annotations.gold import TruthSource
 
     if source not in (TruthSource.SAMPLE, TruthSource.VERSION):
-        raise typer.BadParameter("say sample or version", param_hint="--from")
+        raise typer.BadParameter("use --from sample or --from version", param_hint="--from")
     server = get_current_server()
     if server is not None:
         from app.terminal.remote import make_gold_groups_on_server
@@ -151,7 +151,7 @@ def change(
 ) -> None:
     """Change how many gold groups a batch mixes in, also while people work on it."""
     if (gold_every is None) != no_gold:
-        raise typer.BadParameter("say how many, or --no-gold", param_hint="--gold-every")
+        raise typer.BadParameter("use either --gold-every or --no-gold", param_hint="--gold-every")
     server = get_current_server()
     if server is not None:
         from app.terminal.remote import change_gold_frequency

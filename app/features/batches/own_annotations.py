@@ -208,7 +208,11 @@ def adopt_if_sole_annotator(store: Store, batch: Batch, person: str) -> None:
             adopt_annotation(store, row.id, actor=person, also=note_work, decided=False)
         except ConflictError as error:
             # It waits for a lead, or for the next time; the person goes on meanwhile.
-            log.warning("an annotation waits to be taken over", id=row.id, error=str(error))
+            log.warning(
+                "a submitted annotation was not applied to its group yet",
+                id=row.id,
+                error=str(error),
+            )
 
 
 def let_group_wait_for_reviewer(

@@ -124,14 +124,16 @@ def import_(
         from app.features.recordings.commands import import_videos
 
         if dry_run:
-            raise typer.BadParameter("a recording is indexed, or not; leave --dry-run out")
+            raise typer.BadParameter("the format video has no dry run: leave out --dry-run")
         usual = lines, calibration, size, policy, frames, ball_category or None, group_by or None
         if any(value is not None for value in usual) or frame_offset != "8" or flip or not propose:
-            raise typer.BadParameter("video takes --dataset and --json alone")
+            raise typer.BadParameter(
+                "the format video uses only --dataset and --json: leave out the other options"
+            )
         import_videos([Path(path) for path in paths], dataset, json_)
         return
     if len(paths) > 1:
-        raise typer.BadParameter(f"{format_} is read from one place: name one PATH")
+        raise typer.BadParameter(f"{format_} is read from one PATH, not {len(paths)}")
     path = paths[0]
     server = get_current_server()
     if server is not None:
@@ -250,7 +252,9 @@ def export(
         from app.terminal import remote
 
         if images == "link":
-            raise typer.BadParameter("a server cannot link to frames here; choose copy or none")
+            raise typer.BadParameter(
+                "a server cannot link to frames of this computer: use --images copy or --images none"
+            )
         request = {"dataset": dataset, "format": format_, "all": everything, **options}
         with connect_to_server(server) as client, show_progress("Exporting") as progress:
             sent_to = out if is_address(out) else Path(out)

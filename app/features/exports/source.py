@@ -285,7 +285,7 @@ def _nothing_to_export_error(
 ) -> InputError:
     if everything:
         return InputError(
-            f'dataset "{dataset.name}" holds no groups, so there is nothing to export'
+            f'dataset "{dataset.name}" contains no groups, so there is nothing to export'
         )
     if left_out:
         reasons = ", ".join(f"{count} {reason}" for reason, count in left_out.items())

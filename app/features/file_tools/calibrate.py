@@ -119,7 +119,7 @@ def calibrate_files(
     report = ReaderReport()
     files = list(read_line_files(source, size, report))
     if not files:
-        raise report.make_refusal_error(f"{source} holds no line files")
+        raise report.make_refusal_error(f"{source} contains no line files")
     geometry: PictureGeometry | None = None
     picture_summary: dict[str, Any] | None = None
     if picture is not None or guess_picture:
@@ -368,7 +368,7 @@ def score_camera_files(
     report, camera_report = ReaderReport(), ReaderReport()
     found = _cameras_by_frame(read_cameras(cameras, camera_report))
     if not found:
-        raise camera_report.make_refusal_error(f"{cameras} holds no camera files")
+        raise camera_report.make_refusal_error(f"{cameras} contains no camera files")
     dropped = _read_wrong_labels(without) if without is not None else set()
     pitch = Pitch()
     scores = []
@@ -383,7 +383,7 @@ def score_camera_files(
         if progress is not None:
             progress(len(scores))
     if not scores:
-        raise report.make_refusal_error(f"{lines} holds no line files")
+        raise report.make_refusal_error(f"{lines} contains no line files")
     if all(score is None for score in scores):
         frame, other = sorted(frames)[0], sorted(found)[0]
         raise InputError(

@@ -51,7 +51,7 @@ def export_cameras(
     found = read_cameras(source, report, sizes=sizes)
     cameras = key_by_frame_number(found)
     if not cameras:
-        raise report.make_refusal_error(f"{source} holds no camera_<frame>.json")
+        raise report.make_refusal_error(f"{source} contains no camera_<frame>.json")
     if kind == "npz":
         content = io.BytesIO()
         arrays: dict[str, Any] = dict(cameras_to_arrays(cameras, source.resolve().name))

@@ -120,7 +120,7 @@ def estimate_pitch_of_files(source: Path, *, size: ImageSize) -> dict[str, Any]:
         PitchSizeFrameLines(file.lines, size) for file in read_line_files(source, size, report)
     ]
     if not frames:
-        raise report.make_refusal_error(f"{source} holds no line files")
+        raise report.make_refusal_error(f"{source} contains no line files")
     found = estimate_pitch(frames, CLICKED)
     return {
         "length_m": found.length,
@@ -142,7 +142,7 @@ def estimate_picture_geometry_of_files(source: Path, *, size: ImageSize) -> dict
     report = ReaderReport()
     files = list(read_line_files(source, size, report))
     if not files:
-        raise report.make_refusal_error(f"{source} holds no line files")
+        raise report.make_refusal_error(f"{source} contains no line files")
     found = _estimate_picture_geometry(files, size)
     values = _picture_estimate_to_json(found)
     return {**values, "problems": [problem.message for problem in report.problems]}

@@ -247,7 +247,7 @@ def _read_line_values(lines: Path, settings: Settings, report: ReaderReport) -> 
     values: dict[str, Any] = {}
     with open_tree_context(lines, report, ImportLimits.of(settings)) as tree:
         if tree is None:
-            raise report.make_refusal_error(f"{lines} holds no line files")
+            raise report.make_refusal_error(f"{lines} contains no line files")
         for name in tree.names():
             place = PurePosixPath(name)
             if place.suffix.lower() != ".json":

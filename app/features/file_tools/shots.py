@@ -180,7 +180,7 @@ def _read_ball_rays(folder: Path, report: ReaderReport) -> BallRays:
         raise InputError(f"{folder} is not a folder of camera files and {BALL_FILE}")
     cameras = key_by_frame_number(read_cameras(folder, report))
     if not cameras:
-        raise report.make_refusal_error(f"{folder} holds no camera_<frame>.json")
+        raise report.make_refusal_error(f"{folder} contains no camera_<frame>.json")
     rows = read_ball_rows(folder / BALL_FILE, str(folder / BALL_FILE), report)
     seen = [(time, pixel, cameras[frame]) for frame, time, pixel in rows if frame in cameras]
     if not seen:
@@ -199,8 +199,8 @@ def _read_ball_rays(folder: Path, report: ReaderReport) -> BallRays:
     kept = [one for one, first in zip(seen, new, strict=True) if first]
     if len(kept) > _MOST_RAYS:
         raise InputError(
-            f"{folder / BALL_FILE} has {len(kept):,} frames with a ball, and a shot may have"
-            f" {_MOST_RAYS:,} at most",
+            f"{folder / BALL_FILE} has {len(kept):,} frames with a ball;"
+            f" the limit is {_MOST_RAYS:,}",
             hint="Give only the rows of one shot.",
         )
     return build_ball_rays(

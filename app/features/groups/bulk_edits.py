@@ -365,7 +365,7 @@ def _require_request_point_limit(items: Sequence[ViewEdits]) -> None:
     count = sum(len(points or ()) for edit in edits for points in edit.lines.values())
     if count > REQUEST_POINTS:
         raise TooManyPointsError(
-            f"the lines of all items have {count} points, a request may have {REQUEST_POINTS}",
+            f"the lines of all items have {count} points; the limit is {REQUEST_POINTS}",
             hint="Send the items in several requests.",
             pointer="/items",
         )

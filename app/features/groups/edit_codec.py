@@ -202,15 +202,13 @@ def require_point_limits(view: str, lines: Lines, changes: LineChanges) -> None:
     for marking, points in changes.items():
         count = len(points or ())
         if count > max(MARKING_POINTS, counts.get(marking, 0)):
-            raise _too_many_points_error(
-                f"{view}: {marking} has {count} points", "a marking", MARKING_POINTS
-            )
+            raise _too_many_points_error(f"{view}: {marking} has {count} points", MARKING_POINTS)
         counts[marking] = count
     after = sum(counts.values())
     if after > max(VIEW_POINTS, before):
         names = ", ".join(changes)
         raise _too_many_points_error(
-            f"{view}: with {names} its lines have {after} points", "a view", VIEW_POINTS
+            f"{view}: with {names} its lines have {after} points", VIEW_POINTS
         )
 
 
@@ -229,13 +227,12 @@ def require_point_limits_of_edits(group: Group, edits: Sequence[Edit]) -> None:
     if sum(counts.values()) > REQUEST_POINTS:
         (view_key, marking), count = max(counts.items(), key=lambda item: item[1])
         raise _too_many_points_error(
-            f"view {view_key}: {marking} brings {count} of {sum(counts.values())} points",
-            "a request",
+            f"the request has {sum(counts.values())} points ({count} in {marking} of view {view_key})",
             REQUEST_POINTS,
         )
 
 
-def _too_many_points_error(found: str, what: str, most: int) -> TooManyPointsError:
+def _too_many_points_error(found: str, most: int) -> TooManyPointsError:
     return TooManyPointsError(
-        f"{found}, {what} may have {most}", hint="Leave points out: a few on each line suffice."
+        f"{found}; the limit is {most}", hint="Leave points out: a few on each line suffice."
     )

@@ -148,7 +148,7 @@ class GroupLimits:
         """The group with no more points than its views may have; None where it has too many views."""
         count = len(group.views)
         if count > MAX_VIEWS:
-            problem = f"has {count:,} views, a group may have {MAX_VIEWS}; it is left out"
+            problem = f"has {count:,} views; the limit is {MAX_VIEWS}: it is left out"
             self.report_group_left_out(group.key, problem)
             return None
         return replace(
@@ -178,7 +178,7 @@ class GroupLimits:
         what = f"camera {station.key}" if station.shared else f"view {view.key}"
         count, total = len(station.lines[marking]), count_points(station.lines)
         problem = (
-            f"has {count:,} of {total:,} points, and a view may have {MAX_POINTS:,}; "
+            f"has {count:,} of {total:,} points; the limit of a view is {MAX_POINTS:,}: "
             "this marking is left out"
         )
         self._report.add_problem_at(self._source, group.key, f"{what}, {marking}", problem)

@@ -108,12 +108,12 @@ def import_given_cameras(
             report.left_out.add_problem_at(source, f'camera "{name}"', None, problem)
             continue
         if len(fitting) > 1:
-            report.problems.append(f'camera "{name}" is that of {len(fitting)} views of this name')
+            report.problems.append(f'camera "{name}" belongs to {len(fitting)} views of this name')
         stated = (sizes or {}).get(name)
         if stated is not None and size not in (None, stated):
             report.problems.append(
                 f'camera "{name}": its file says {stated.width} x {stated.height}, and --size is '
-                f"{size.width}x{size.height}; that of the file counts"
+                f"{size.width}x{size.height}; the size in the file is used"
             )
         made_for = stated or size
         report.problems.extend(_iterate_size_warnings(name, cameras[name], fitting, made_for))

@@ -410,7 +410,7 @@ def _update_group(
             origin.source,
             incoming.key,
             None,
-            f"would have {count} views with those that people edited, a group may have {MAX_VIEWS}; "
+            f"would have {count} views with those that people edited; the limit is {MAX_VIEWS}: "
             "it stays as it is",
         )
         return

@@ -43,7 +43,7 @@ RIG_FRAMES = 100
 """Left-out records that a job's result names; all are counted."""
 LIMITS_HINT = (
     "Import it in parts, or have the operator raise TOUCHLINE_IMPORT_MEMORY or "
-    "TOUCHLINE_IMPORT_SECONDS. What was imported before it ended stays, and is not brought twice."
+    "TOUCHLINE_IMPORT_SECONDS. What was imported before the job ended stays, and is not imported twice."
 )
 
 

@@ -231,7 +231,7 @@ def _parse_group_record(value: Json, shared: Mapping[str, Station]) -> Group:
         _require_list(fields["balls"], MAX_BALLS)
         _parse_extras_record(fields["extras"])
         if view.included not in (True, False):
-            raise InputError("has a view whose `included` is neither true nor false")
+            raise InputError("has a view whose `included` is not true or false")
         if view.left_out is not None:
             _require_known_exclusion_reason(view)
         if not isinstance(fields["station"], str) and _validate_station(view.station).shared:
@@ -276,7 +276,7 @@ def _validate_station(station: Station) -> Station:
             raise InputError(f"has spaces around the name of the marking {quote_text(marking)}")
     if (count := count_points(station.lines)) > MAX_POINTS:
         raise InputError(
-            f"has {count:,} points in the lines of {station.key}, and a view may have {MAX_POINTS:,}"
+            f"has {count:,} points in the lines of {station.key}; the limit is {MAX_POINTS:,}"
         )
     if [*station.proposed] != [name for name in station.lines if name in station.proposed]:
         raise InputError("names lines as proposed that the view does not have")
@@ -285,7 +285,7 @@ def _validate_station(station: Station) -> Station:
 
 def _require_booleans(what: str, *values: object) -> None:
     if not all(isinstance(value, bool) for value in values):
-        raise InputError(f"has {what} is neither true nor false")
+        raise InputError(f"has {what} is not true or false")
 
 
 def _parse_verdict_record(value: Json) -> Mapping[str, Any]:

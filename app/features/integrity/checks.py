@@ -194,7 +194,9 @@ def _check_digests(session: Session) -> CheckResult:
         if (present, group.inputs_hash) != (views, hashed):
             apart.append(f"group {group.id}")
     whole = f"of {count:,} groups and cameras, each matching its annotations"
-    return summarize_faulty_records("digests", whole, apart, "not of what was said", REBUILD)
+    return summarize_faulty_records(
+        "digests", whole, apart, "whose digest does not match their annotations", REBUILD
+    )
 
 
 def _check_review_queue(session: Session, advice: str) -> CheckResult:

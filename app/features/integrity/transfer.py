@@ -94,7 +94,7 @@ def _resolve_database_url(place: str, name: str) -> str | None:
     address = read_private_file(file, name)
     if "://" not in address:
         raise InputError(
-            f"{file} holds no address of a database",
+            f"{file} contains no address of a database",
             hint="Write postgresql://USER:PASSWORD@HOST/DATABASE into it, or name a home folder.",
         )
     return address

@@ -34,9 +34,9 @@ def maintenance(
     from app.features.maintenance.service import clear_banner, read_banner, set_banner
 
     if clear and (text or starts or until):
-        raise typer.BadParameter("--clear takes the notice away, and needs nothing else")
+        raise typer.BadParameter("--clear removes the notice: leave out TEXT, --starts and --until")
     if text is None and (starts or until):
-        raise typer.BadParameter("--starts and --until belong to a text")
+        raise typer.BadParameter("--starts and --until need TEXT")
     begin, end = _parse_time(starts, "--starts"), _parse_time(until, "--until")
     with open_store() as store:
         if clear:

@@ -68,11 +68,13 @@ def pitch(
     pitches, `touchline solve` computes what follows from it.
     """
     if (source is None) == (dataset is None):
-        raise typer.BadParameter("give either line files or --dataset")
+        raise typer.BadParameter("use either line files or --dataset")
     # What this user may not see is no file of theirs, but may be a dataset.
     if source is not None and os.path.exists(source):  # noqa: PTH110
         if accept or match or set_:
-            raise typer.BadParameter("--accept, --match and --set are for datasets")
+            raise typer.BadParameter(
+                "--accept, --match and --set need a dataset: leave them out for line files"
+            )
         from app.features.file_tools.matches import estimate_pitch_of_files
 
         print_values(estimate_pitch_of_files(Path(source), size=size), json_)
@@ -165,16 +167,16 @@ def picture(
     After a change of a dataset's pictures, `touchline solve` computes what follows from it.
     """
     if (source is None) == (dataset is None):
-        raise typer.BadParameter("give either line files or --dataset")
+        raise typer.BadParameter("use either line files or --dataset")
     if source is not None:
         if accept or as_taken or match:
-            raise typer.BadParameter("--accept, --as-taken and --match are for datasets")
+            raise typer.BadParameter("--accept, --as-taken and --match need --dataset")
         from app.features.file_tools.matches import estimate_picture_geometry_of_files
 
         print_values(estimate_picture_geometry_of_files(source, size=size), json_)
         return
     if accept and as_taken:
-        raise typer.BadParameter("--accept and --as-taken contradict each other")
+        raise typer.BadParameter("use either --accept or --as-taken")
     if as_taken and match is None:
         raise typer.BadParameter("--as-taken needs --match")
     _estimate_picture_geometry_of_dataset(dataset or "", match, accept, as_taken, workers, json_)
@@ -266,7 +268,7 @@ def positions(
     )
 
     if share and undo:
-        raise typer.BadParameter("share positions or take them back, one at a time")
+        raise typer.BadParameter("use either --share or --undo")
     if undo and match is None:
         raise typer.BadParameter("--undo needs --match")
     if share:
@@ -313,7 +315,7 @@ def noise(
     )
 
     if apply and alike:
-        raise typer.BadParameter("--apply and --alike contradict each other")
+        raise typer.BadParameter("use either --apply or --alike")
     with open_store() as store:
         if alike:
             with store.write() as session:
@@ -398,7 +400,7 @@ def rig(
     )
 
     if undo and accept is not None:
-        raise typer.BadParameter("accept a rig or take it back, one at a time")
+        raise typer.BadParameter("use either --accept or --undo")
     with open_store() as store:
         if undo:
             print_values(

@@ -269,7 +269,7 @@ def describe_time_difference(proposal: RigProposal) -> str:
     first, second = (pair.b, pair.a) if offset > 0 else (pair.a, pair.b)
     return (
         f"{first} is {abs(offset):.2f} +- {sigma:.2f} frames ahead of {second}: its frame t shows "
-        f"what {second} shows at t + {abs(offset):.2f}; times are not adjusted: look for a wrong "
+        f"what {second} shows at t + {abs(offset):.2f}; times are not adjusted: check the "
         "frame offset"
     )
 

@@ -69,7 +69,7 @@ def paint(
     )
 
     if show and undo:
-        raise typer.BadParameter("show what was read or take it back, one at a time")
+        raise typer.BadParameter("use either --show or --undo")
     with open_store() as store:
         if undo:
             with store.write() as session:
@@ -107,7 +107,7 @@ def snap(
 
     if size != "native":
         raise typer.BadParameter(
-            "each picture is read in its own size; leave this out", param_hint="--size"
+            "each picture is read in its own size: leave out --size", param_hint="--size"
         )
     with show_progress("Snapping") as progress:
         rows = snap_cameras_to_paint(
@@ -193,15 +193,17 @@ def propose(
     """
     if dataset is not None:
         if images or out or known or tripod or size != "native":
-            raise typer.BadParameter("a dataset has its pictures and cameras: name nothing else")
+            raise typer.BadParameter(
+                "with --dataset, leave out IMAGES, OUT, --size, --known and --tripod"
+            )
         if show and undo:
-            raise typer.BadParameter("show what was proposed or forget it, one at a time")
+            raise typer.BadParameter("use either --show or --undo")
         _propose_for_views(dataset, match, show, undo, workers, json_)
         return
     if not images or out is None:
         raise typer.BadParameter("name IMAGES and OUT, or --dataset")
     if match is not None or show or undo or workers is not None:
-        raise typer.BadParameter("--match, --show, --undo and --workers go with --dataset")
+        raise typer.BadParameter("--match, --show, --undo and --workers need --dataset")
     _propose_for_files(images, out, size, known or (), tripod, json_)
 
 
@@ -218,7 +220,9 @@ def _propose_for_views(
     with open_store() as store:
         if undo:
             if match is not None:
-                raise typer.BadParameter("all of a dataset is forgotten, or nothing")
+                raise typer.BadParameter(
+                    "--undo deletes all proposals of the dataset: leave out --match"
+                )
             print_values({"forgotten": forget_proposals(store, dataset)}, json_)
             return
         if show:

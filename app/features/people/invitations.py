@@ -158,7 +158,7 @@ def invite_many(
     require_no_token(actor)
     if not 0 < len(wanted) <= MOST:
         raise InputError(
-            f"a list has 1 to {MOST} people, and this one {len(wanted):,}", pointer="/people"
+            f"the list has {len(wanted):,} people; it must have 1 to {MOST}", pointer="/people"
         )
     refused: list[InvitationOutcome] = []
     made: list[tuple[InvitationOutcome, PasswordLink | None, str | None]] = []

@@ -62,10 +62,18 @@ class ProviderClient:
             status, content = asyncio.run(self._fetch(method, address, sent, body))
             found = json.loads(content)
         except (httpx.HTTPError, httpx.InvalidURL, OSError, ValueError, RecursionError) as error:
-            log.warning("no answer of the provider", address=address, reason=repr(error)[:200])
+            log.warning(
+                "the login provider gave no usable response",
+                address=address,
+                reason=repr(error)[:200],
+            )
             raise self._provider_failed_error() from error
         if not isinstance(found, dict):
-            log.warning("no answer of the provider", address=address, reason="no JSON object")
+            log.warning(
+                "the login provider gave no usable response",
+                address=address,
+                reason="the body is not a JSON object",
+            )
             raise self._provider_failed_error()
         return status, found
 

@@ -211,8 +211,8 @@ def change_person(
             session, Role.ADMIN, but=person_id, only_issuer=only
         ):
             raise ConflictError(
-                f"without {person.name} no admin could log in any more",
-                hint="Make somebody admin first who can log in.",
+                f"{person.name} is the only admin who can log in",
+                hint="First give the role admin to another person who can log in.",
             )
         if wanted is not person.role:
             log_account_event(session, actor, person.name, "role", wanted)

@@ -324,8 +324,8 @@ def unlink_person(store: Store, person_id: int, *, actor: str) -> None:
         left = count_people_who_can_log_in(session, Role.ADMIN, only_issuer=only)
         if person.role == Role.ADMIN and not left:
             raise ConflictError(
-                f"without the linked account of {person.name} no admin could log in any more",
-                hint=f"Give {person.name} a password first, or make somebody admin who can log in.",
+                f"{person.name} is the only admin who can log in, and only by the linked account",
+                hint=f"Give {person.name} a password first, or give the role admin to another person who can log in.",
             )
         delete_logins(session, person_id, way=LoginMethod.SIGN_ON)
         log_account_event(session, actor, person.name, "single sign-on unlinked", person.role)

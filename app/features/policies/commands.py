@@ -108,7 +108,7 @@ def read_policy_option(text: str) -> Policy:
         return POLICIES[text]
     path = Path(text)
     if not path.is_file():
-        raise typer.BadParameter(unknown_policy_error(text, "it is no YAML file").message)
+        raise typer.BadParameter(unknown_policy_error(text, "it is not a YAML file").message)
     yaml = read_text(path, MAX_CHARACTERS)
     try:
         return policy_from_yaml(yaml)

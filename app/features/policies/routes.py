@@ -126,7 +126,7 @@ def build_requested_policy(change: PolicyChange, present: Policy) -> Policy:
     if not change.values and change.name in POLICIES:
         return POLICIES[change.name]
     if not change.values and change.name != present.name:
-        raise unknown_policy_error(change.name or "", "it brings no values", pointer="/name")
+        raise unknown_policy_error(change.name or "", "the request has no values", pointer="/name")
     # A shipped policy with another threshold is no longer the one of that name.
     name = change.name or (CUSTOM if present.name in POLICIES else present.name)
     return replace_thresholds(present, change.values or {}, name=name, pointer="/values")

@@ -180,7 +180,7 @@ WORDS = {
         question="The views are calibrated, and still there is no 3D ball. What is missing?",
         hint="Look at the small ball pictures below: does every view have a ball? Where the rays "
         "of the other views cross the picture is where to search.",
-        fault="Nobody marked the ball in view {view}, although it can be seen.",
+        fault="The ball can be seen in view {view}, but is not annotated there.",
         best="Press Enter, click the ball on the dotted line in view {view}, then press A.",
     ),
     "undrawn_line": LessonTemplates(
@@ -190,7 +190,7 @@ WORDS = {
             "Look for white paint with a thin dotted line and no points: it is visible, but not "
             "annotated. Such lines count as missed."
         ),
-        fault="In view {view} nobody annotated {markings}, although they can be seen.",
+        fault="{markings} can be seen in view {view}, but are not annotated there.",
         best="Press Enter: it leads to the line with its name chosen. Click two points on the "
         "paint and press Escape. When the card says that the group passes, press A.",
     ),

@@ -112,7 +112,10 @@ def make_recording_practice(
     """
     settings, name = store.settings, make_recording_practice_name(person)
     film = settings.home / FILM
-    with hold_practice_lock(settings, lambda: progress(0, 1, "Somebody else makes it.")):
+    with hold_practice_lock(
+        settings,
+        lambda: progress(0, 1, "Waiting: another process is making the practice recording."),
+    ):
         require_practice_name_free(store, person)
         there = _find_recording(store, person)
         if there is not None and not again and _read_truth(settings) and there.problem is None:

@@ -170,7 +170,9 @@ def make_practice_dataset(
     Raises:
         ConflictError: There is a dataset of that name that is not the practice.
     """
-    with hold_practice_lock(settings, lambda: progress(0, 1, "Somebody else makes them.")):
+    with hold_practice_lock(
+        settings, lambda: progress(0, 1, "Waiting: another process is making the practice groups.")
+    ):
         name = make_practice_name(person)
         _require_practice_name_free(store, settings, person)
         ids = _group_ids(store, name)

@@ -253,11 +253,13 @@ def detect(
 
     source = model if boxes is None else boxes
     if source is None or (model is not None and boxes is not None):
-        raise typer.BadParameter("name --model, or --boxes with --recording")
+        raise typer.BadParameter("use either --model, or --boxes with --recording")
     if recording is None and (frames is not None or boxes is not None):
-        raise typer.BadParameter("--frames and --boxes are of a --recording")
+        raise typer.BadParameter("--frames and --boxes need --recording")
     if recording is not None and (query or missing):
-        raise typer.BadParameter("--query and --missing choose groups, not frames of a recording")
+        raise typer.BadParameter(
+            "--query and --missing choose groups: leave them out with --recording"
+        )
     settings = read_settings()
     opened = None
     if model is not None:
@@ -304,7 +306,7 @@ def _detect_or_import_boxes(
         found, by = find_recording(store, dataset, recording), get_current_actor()
         if isinstance(source, Path):
             if numbers is not None:
-                raise typer.BadParameter("--frames are those that a --model looks at")
+                raise typer.BadParameter("--frames needs --model: leave it out with --boxes")
             kept = import_boxes_from_file(store, found, source, name, min_score=min_score, actor=by)
         else:
             kept = detect_in_frames(

@@ -358,7 +358,7 @@ def _no_frames_error(dataset: DatasetHead, request: EvaluationRequest) -> InputE
     of = f' in the split "{request.split}"' if request.split else ""
     hint = "A group is evaluated when the policy passes it and it is not rejected."
     if request.groups == "accepted":
-        hint = "Nobody has accepted a group; evaluate the passing ones, or accept some."
+        hint = "No group is accepted yet: accept some, or evaluate the passing ones."
     return InputError(f'no group of "{dataset.name}" can be evaluated{of}', hint=hint)
 
 

@@ -81,7 +81,7 @@ def add_predictions(
     if nothing and (boxes.unknown or cameras.unknown or boxes.report.problems):
         raise _unknown_frames_error(boxes, cameras, names)
     if boxes.tracks and not any(track.position for track in boxes.tracks.values()):
-        raise next(iter(boxes.report.problems), InputError(f"{first.name} holds no ball"))
+        raise next(iter(boxes.report.problems), InputError(f"{first.name} contains no ball"))
     return save_predictions(
         store,
         dataset,

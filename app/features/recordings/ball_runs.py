@@ -203,7 +203,7 @@ def review_ball_run(
             if change.accepted or counts["refused"]:
                 found = _update_run(session, run, groups=canonical_json_text(counts))
             else:
-                did, values = "ball run taken back", {"accepted_by": None, "groups": "{}"}
+                did, values = "ball run acceptance undone", {"accepted_by": None, "groups": "{}"}
                 found = _save_run_change(session, run, actor, did, **values)
             session.respond(found)
             return found

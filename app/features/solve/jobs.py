@@ -103,7 +103,7 @@ def refresh_yield_table(
     """Count what a dataset yields where many groups were solved, so that the first look finds it."""
     if report.solved > AT_ONCE:
         found = get_dataset_head(store, dataset)
-        progress(report.total, report.total, f"Counting what {found.name} yields.")
+        progress(report.total, report.total, f"Counting the passing groups of {found.name}.")
         WhatIfStore(store).update_table(found.id)
 
 

@@ -57,9 +57,9 @@ def follow(
     )
 
     if accept and undo:
-        raise typer.BadParameter("place the balls or take them away, one at a time")
+        raise typer.BadParameter("use either --accept or --undo")
     if undo and at is not None:
-        raise typer.BadParameter("--undo removes balls wherever they are: leave --at out")
+        raise typer.BadParameter("--undo removes all balls that were followed: leave out --at")
     place = _parse_image_point(at)
     with open_store() as store:
         view = _find_view_id(store, dataset, group, camera)

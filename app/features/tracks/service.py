@@ -340,12 +340,12 @@ def _require_acceptable(track: Track) -> None:
     if track.summary.reason is not None:
         raise ConflictError(
             f'the stretch "{track.key}" has no track ({track.summary.reason})',
-            hint="Annotate the ball in more of its frames, and make its track again.",
+            hint="Annotate the ball in more of its frames, and recompute the track.",
         )
     if track.stale:
         raise ConflictError(
-            f'groups of the track "{track.key}" have changed since it was made',
-            hint="Make it again, and accept that one.",
+            f'groups of the track "{track.key}" have changed since it was computed',
+            hint="Recompute the track, then accept it.",
         )
 
 

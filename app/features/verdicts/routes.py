@@ -85,7 +85,9 @@ class VerdictEdit(BaseModel):
     def _require_one_meaning(self) -> Self:
         given = (self.redo_of, self.reason, self.note)
         if self.undo_of and (self.state != "unreviewed" or any(given)):
-            raise ValueError("undo_of goes with the state unreviewed, and with nothing else")
+            raise ValueError(
+                "undo_of needs the state unreviewed: leave out redo_of, reason and note"
+            )
         return self
 
 

@@ -330,7 +330,7 @@ def _not_ready_error(kept: _YieldEntry) -> OverloadedError:
     done, left = kept.read
     return OverloadedError(
         f"the yield is being counted: {done:,} groups are read, about {left:,} are left",
-        hint="Ask again in a few seconds.",
+        hint="Repeat the request in a few seconds.",
     )
 
 
@@ -340,8 +340,10 @@ def examine_yield_cache(settings: Settings) -> CheckResult:
     damaged = [path for path in files if not _is_file_readable(path)]
     if damaged:
         more = "" if len(damaged) == 1 else f" and {plural(len(damaged) - 1, 'other')}"
-        sentence = f"{damaged[0].relative_to(settings.home)}{more} cannot be read as written"
-        advice = f"Stop the server and delete {settings.yields}: yields are counted anew."
+        sentence = f"{damaged[0].relative_to(settings.home)}{more} cannot be read"
+        advice = (
+            f"Stop the server and delete {settings.yields}: the server computes the counts again."
+        )
         return CheckResult("yields", False, sentence, advice)
     count = plural(len(files), "file")
     return CheckResult("yields", True, f"{count} in the cache, each as it was written")

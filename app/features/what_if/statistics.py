@@ -252,5 +252,7 @@ def _read_columns(session: Session, file: Path) -> _DatasetColumns | None:
     except FileNotFoundError:
         return None
     except (OSError, ValueError, KeyError, TypeError) as error:
-        log.warning("statistics cannot be read, and are counted anew", error=str(error))
+        log.warning(
+            "the cached statistics cannot be read; they are computed again", error=str(error)
+        )
         return None

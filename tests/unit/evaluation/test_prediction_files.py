@@ -73,9 +73,9 @@ class TestReadPredictions:
     @pytest.mark.parametrize(
         ("format_", "name", "problem"),
         [
-            ("coco", "x.csv", "holds no COCO results"),
-            ("yolo", "x.csv", "holds no text files"),
-            ("csv", "x.json", "holds no CSV file"),
+            ("coco", "x.csv", "contains no COCO results"),
+            ("yolo", "x.csv", "contains no text files"),
+            ("csv", "x.json", "contains no CSV file"),
         ],
     )
     def test_a_file_of_another_kind_is_named_and_not_its_folder(

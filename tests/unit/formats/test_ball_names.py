@@ -112,7 +112,7 @@ class TestCategories:
         assert balls(tmp_path, report, coco(categories=[category(name)])) == 0
         (problem,) = report.problems
         assert problem.field == "categories"
-        assert "the file brings no ball" in problem.problem
+        assert "the file contains no ball" in problem.problem
         assert f'("{name}")' in problem.problem
         assert "--ball-category" in problem.problem
 
@@ -131,7 +131,9 @@ class TestCategories:
         self, tmp_path: Path, report: ReaderReport
     ) -> None:
         assert balls(tmp_path, report, coco(), "puck") == 0
-        assert 'none of its categories ("ball", "Player") is taken' in report.problems[0].problem
+        assert (
+            'none of its categories ("ball", "Player") is recognised' in report.problems[0].problem
+        )
 
     def test_without_a_list_the_only_id_is_the_ball_where_no_picture_has_two(
         self, tmp_path: Path, report: ReaderReport

@@ -229,8 +229,8 @@ class TestCameraFromJson:
     @pytest.mark.parametrize(
         ("changes", "field", "problem"),
         [
-            ({"lens": "bottle"}, "lens", "lenses are fisheye or arctan_polynomial"),
-            ({"lens": ["fisheye"]}, "lens", "lenses are"),
+            ({"lens": "bottle"}, "lens", "must be fisheye or arctan_polynomial"),
+            ({"lens": ["fisheye"]}, "lens", "must be fisheye or"),
             ({"lens": "fisheye"}, "lens_coefficients", "is missing"),
             ({"lens": "fisheye", "lens_coefficients": [0.1] * 5}, "lens_coefficients", "not 4"),
             ({"lens_coefficients": [0.1] * 4}, "lens_coefficients", "need a lens"),

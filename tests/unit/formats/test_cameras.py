@@ -157,7 +157,7 @@ class TestReadCameras:
     ) -> None:
         (tmp_path / "a.homographies").write_text("1 0 0\n")
         assert read_cameras(tmp_path, report) == {}
-        assert "holds no camera files (.json, .jsonl, .npz, .yml), but .homographies" in str(
+        assert "contains no camera files (.json, .jsonl, .npz, .yml), but .homographies" in str(
             report.problems[0]
         )
 

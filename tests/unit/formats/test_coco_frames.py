@@ -277,7 +277,7 @@ class TestPicturesOfFrames:
     def test_captions_alone_bring_no_ball(self, tmp_path: Path, report: ReaderReport) -> None:
         caption = {"id": 1, "image_id": 1, "caption": "a ball"}
         read(tmp_path, report, **{"captions_default.json": coco(annotations=[caption])})
-        assert "the file brings no ball" in report.problems[0].problem
+        assert "the file contains no ball" in report.problems[0].problem
 
     def test_a_picture_found_by_the_end_of_its_name_is_said(
         self, tmp_path: Path, report: ReaderReport

@@ -342,7 +342,7 @@ class TestReadCoco:
         assert group.views[0].balls == ()
         first, last = report.problems
         assert (first.field, first.problem) == ("categories", "is not a list; left out")
-        assert "none of its categories (id 37, id 1) is taken for it" in last.problem
+        assert "none of its categories (id 37, id 1) is recognised as the ball" in last.problem
 
     def test_a_box_with_infinity_is_left_out_and_the_rest_is_read(
         self, read: Callable[[Any], list[Group]], report: ReaderReport
@@ -445,7 +445,7 @@ class TestJoins:
     ) -> None:
         write(tmp_path, {"x.json": coco(), "package.json": {"name": "x"}})
         assert len(list(read_coco(tmp_path, report))) == 1
-        assert any("package.json: is no COCO file" in remark for remark in report.remarks)
+        assert any("package.json: is not a COCO file" in remark for remark in report.remarks)
         assert report.problems == []
 
 

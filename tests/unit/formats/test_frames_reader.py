@@ -76,14 +76,14 @@ class TestReadFrames:
         told = {Path(problem.path).name: problem.problem for problem in report.problems}
         assert sorted(told) == ["c.jpg", "iphone.heic", "match.mp4", "notes.txt", "wide.png"]
         assert told["match.mp4"].startswith("is a video: bring it in as a recording")
-        assert told["notes.txt"] == "is no JPEG, PNG or WebP picture"
+        assert told["notes.txt"] == "is not a JPEG, PNG or WebP picture"
         assert told["c.jpg"] == "is damaged in its header"
         assert told["wide.png"].startswith("declares 600 x 10 pixels")
 
     def test_a_folder_without_pictures_says_so(self, tmp_path: Path, report: ReaderReport) -> None:
         assert read(tmp_path, report) == []
         (problem,) = report.problems
-        assert problem.problem == "holds no picture (JPEG, PNG or WebP)"
+        assert problem.problem == "contains no picture (JPEG, PNG or WebP)"
 
     def test_a_large_profile_before_the_size_is_passed_over(
         self, tmp_path: Path, report: ReaderReport

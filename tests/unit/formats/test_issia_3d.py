@@ -65,7 +65,7 @@ class TestOpenIssia3d:
 
     def test_a_folder_without_the_table_says_so(self, tmp_path: Path, report: ReaderReport) -> None:
         assert list(open_issia_3d(tmp_path, IssiaOptions(), report).groups()) == []
-        assert "holds no ISSIA-3D.csv" in report.problems[0].problem
+        assert "contains no ISSIA-3D.csv" in report.problems[0].problem
 
 
 Solved = Callable[..., ExportRecord]

@@ -166,7 +166,7 @@ class TestGroups:
 
     def test_a_folder_without_xgtf_is_reported(self, tmp_path: Path, report: ReaderReport) -> None:
         assert _groups(tmp_path, report) == []
-        assert "holds no XGTF file" in str(report.problems[0])
+        assert "contains no XGTF file" in str(report.problems[0])
 
     def test_a_frame_of_cameras_of_both_splits_has_none(
         self, folder: Path, report: ReaderReport
@@ -262,7 +262,7 @@ class TestFileWithoutABall:
         (folder / "truth" / "cam5.xgtf").write_text(_xgtf({}, {18: 1}))
         _groups(folder, report)
         (remark,) = report.remarks
-        assert remark.endswith("cam5.xgtf brings no ball for camera 5.")
+        assert remark.endswith("cam5.xgtf contains no ball for camera 5.")
 
 
 class TestFilesOfOtherNames:

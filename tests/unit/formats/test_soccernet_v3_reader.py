@@ -113,7 +113,7 @@ class TestReadSoccernetV3:
         groups = _read(write_labels(labels), report)
         assert [len(group.views) for group in groups] == [3, 1]
         assert str(report.problems[0]).endswith(
-            "8.png, linked_replays: names 8_1.png, which is not there"
+            "8.png, linked_replays: names 8_1.png, which this file does not contain"
         )
 
     def test_a_replay_without_its_action_is_reported(
@@ -180,4 +180,4 @@ class TestReadSoccernetV3:
         self, tmp_path: Path, report: ReaderReport
     ) -> None:
         assert _read(tmp_path, report) == []
-        assert "holds no Labels-v3.json" in str(report.problems[0])
+        assert "contains no Labels-v3.json" in str(report.problems[0])

@@ -32,13 +32,23 @@ SOCCERNET: dict[str, tuple[Spoil, list[Told], list[int]]] = {
     "actions missing": (
         lambda labels: labels.pop("actions"),
         [(None, "actions", "is missing or not an object")]
-        + [(f"7_{n}.png", "linked_action", "names 7.png, which is not there") for n in (1, 0)],
+        + [
+            (
+                f"7_{n}.png",
+                "linked_action",
+                "names the action 7.png, which this file does not contain",
+            )
+            for n in (1, 0)
+        ],
         [],
     ),
     "replays no object": (
         lambda labels: labels.update(replays=[]),
         [(None, "replays", "is missing or not an object")]
-        + [("7.png", "linked_replays", f"names 7_{n}.png, which is not there") for n in (1, 0)],
+        + [
+            ("7.png", "linked_replays", f"names 7_{n}.png, which this file does not contain")
+            for n in (1, 0)
+        ],
         [1, 1],
     ),
     "no replays at all": (
@@ -74,7 +84,7 @@ SOCCERNET: dict[str, tuple[Spoil, list[Told], list[int]]] = {
             labels["actions"]["7.png"].update(linked_replays=["7_1.png"]),
             labels["replays"]["7_0.png"].update(linked_action="9.png"),
         ),
-        [("7_0.png", "linked_action", "names 9.png, which is not there")],
+        [("7_0.png", "linked_action", "names the action 9.png, which this file does not contain")],
         [2, 1],
     ),
     "an action no object": (

@@ -324,7 +324,7 @@ class TestReadFrame:
             target.writestr("8.png", bomb(16_000, 16_000))
             target.writestr("9.png", PNG[:-40])
         for member, error, what in (
-            ("7.png", ImageError, "is no JPEG, PNG or WebP image"),
+            ("7.png", ImageError, "is not a JPEG, PNG or WebP image"),
             ("8.png", TooLargeError, "declares 16000 x 16000 pixels"),
             ("9.png", ImageError, "is damaged"),
         ):

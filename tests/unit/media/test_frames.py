@@ -183,7 +183,7 @@ class TestFrames:
             frames.read(Media(str(tmp_path / "gone.png")), None, False)
         path = tmp_path / "x.png"
         path.write_bytes(b"hello")
-        with pytest.raises(ImageError, match=r"frame x\.png is no JPEG, PNG or WebP image"):
+        with pytest.raises(ImageError, match=r"frame x\.png is not a JPEG, PNG or WebP image"):
             frames.read(Media(str(path)), None, False)
 
     def test_the_frames_around_one_are_found(self, frames: FrameProvider, tmp_path: Path) -> None:

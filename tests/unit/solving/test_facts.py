@@ -168,7 +168,7 @@ class TestFactsFromBytes:
         "content", [b"", b"no zlib", zlib.compress(b"seven"), zlib.compress(bytes(7 * 8))[:-5]]
     )
     def test_what_was_not_written_is_damage(self, content: bytes) -> None:
-        with pytest.raises(DamagedError, match="facts beside a solution") as refused:
+        with pytest.raises(DamagedError, match="stored numbers of a solution") as refused:
             facts_from_bytes([content])
         assert refused.value.hint
 

@@ -50,6 +50,6 @@ class TestReadSettings:
         monkeypatch.setenv(name, content)
         code, _, err = touchline("doctor")
         assert code == 2
-        assert f"{name} is no JSON; write it as {shape}" in " ".join(err.replace("│", "").split())
+        assert f"{name} is not JSON; write it as {shape}" in " ".join(err.replace("│", "").split())
         assert "example.org" not in err
         assert "Traceback" not in err

@@ -179,7 +179,10 @@ def test_what_is_imported_frozen_exported_and_measured_there_is_as_here(
         assert "none of these groups has known true values" in str(
             run("batch", "gold", "small").exception
         )
-        assert "say sample or version" in run("batch", "gold", "small", "--from", "hearsay").output
+        assert (
+            "use --from sample or --from version"
+            in run("batch", "gold", "small", "--from", "hearsay").output
+        )
     with place.store.write() as session:
         delete_gold(session, 1)
     remote("batch", "change", rest, "--no-gold")

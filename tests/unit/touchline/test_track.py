@@ -51,7 +51,7 @@ class TestTracks:
     def test_a_version_without_tracks_has_none(self, export) -> None:
         version = touchline.open(export)
         assert version.tracks == ()
-        with pytest.raises(DataError, match=r"holds no tracks\.parquet"):
+        with pytest.raises(DataError, match=r"contains no tracks\.parquet"):
             version.table("tracks")
         with pytest.raises(ValueError, match="views, groups, balls, tracks, events"):
             version.table("goals")

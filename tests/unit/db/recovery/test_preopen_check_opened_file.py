@@ -40,7 +40,7 @@ class TestAFileThatIsTakenAway:
             take(own_store.settings.database_file)
         with pytest.raises(DamagedError, match=f"nothing can be changed now: .* {said}") as caught:
             add(own_store, "late")
-        assert "Stop the server and put the file that was moved back" in str(caught.value.hint)
+        assert "Stop the server and move the database file back" in str(caught.value.hint)
         assert names(own_store) == ["kept"]
 
     def test_it_is_seen_before_anything_is_asked_for(self, own_store: Store) -> None:

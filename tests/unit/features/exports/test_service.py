@@ -185,7 +185,7 @@ class TestExport:
 
     def test_an_empty_dataset_has_nothing_either(self, store, tmp_path) -> None:
         ensure_dataset(store, "demo", "ann")
-        with pytest.raises(InputError, match="holds no groups"):
+        with pytest.raises(InputError, match="contains no groups"):
             export_dataset(store, "demo", "cameras", tmp_path / "out", everything=True)
 
     def test_the_manifest_says_what_it_is(self, store, three, tmp_path) -> None:

@@ -131,7 +131,7 @@ class TestCalibrateFiles:
 
     def test_a_folder_without_line_files_is_refused(self, tmp_path):
         (tmp_path / "empty").mkdir()
-        with pytest.raises(InputError, match="holds no line files"):
+        with pytest.raises(InputError, match="contains no line files"):
             run(tmp_path / "empty", tmp_path / "out")
         assert not (tmp_path / "out").exists()
 
@@ -229,7 +229,7 @@ class TestScoreFiles:
 
     def test_a_folder_without_cameras_is_refused(self, lines, tmp_path):
         (tmp_path / "empty").mkdir()
-        with pytest.raises(InputError, match="holds no camera files"):
+        with pytest.raises(InputError, match="contains no camera files"):
             score_camera_files(lines, tmp_path / "empty", size=SIZE)
 
     @pytest.mark.parametrize("text", ["[1]", '{"ms_median": "fast"}'])

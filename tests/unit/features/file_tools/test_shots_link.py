@@ -78,7 +78,7 @@ class TestLinkFiles:
             (lambda live: (live / "ball.csv").write_text("frame,x,y\n1,2,3\n"), "time_s"),
             (
                 lambda live: [one.unlink() for one in live.glob("camera_*")],
-                "holds no camera files",
+                "contains no camera files",
             ),
             (
                 lambda live: (live / "ball.csv").write_text("frame,time_s,x,y\n99999,2,3,4\n"),

@@ -31,9 +31,7 @@ class TestRequireFewPoints:
         require_point_limits("view 7.png", NO_LINES, {"Middle line": points(MARKING_POINTS)})
         with pytest.raises(TooManyPointsError) as caught:
             require_point_limits("view 7.png", NO_LINES, {"Middle line": points(101)})
-        assert (
-            caught.value.message == "view 7.png: Middle line has 101 points, a marking may have 100"
-        )
+        assert caught.value.message == "view 7.png: Middle line has 101 points; the limit is 100"
 
     def test_counts_the_markings_that_stay_and_not_those_that_go(self) -> None:
         full = make_lines({name: points(VIEW_POINTS // 5) for name in NAMES})
@@ -55,7 +53,9 @@ class TestRequireFewPointsInAll:
         edits = [SetLines(f"{number}.png", each) for number in range(20, 25)]
         require_point_limits_of_edits(make_group(7), edits)
         more = SetLines("c.png", {"Middle line": points(1)})
-        with pytest.raises(TooManyPointsError, match=f"of {REQUEST_POINTS + 1} points, a request"):
+        with pytest.raises(
+            TooManyPointsError, match=f"the request has {REQUEST_POINTS + 1} points"
+        ):
             require_point_limits_of_edits(make_group(7), [*edits, more])
 
 

@@ -309,7 +309,7 @@ class TestImage:
         answer = api.get(first["image"], params=params)
         assert (answer.status_code, answer.json()["detail"]) == (
             422,
-            "view 7.png: frame 7.png of Frames-v3.zip is no JPEG, PNG or WebP image",
+            "view 7.png: frame 7.png of Frames-v3.zip is not a JPEG, PNG or WebP image",
         )
         missing = api.get(second["image"], params=params)
         assert (missing.status_code, missing.json()["detail"]) == (

@@ -55,7 +55,7 @@ class TestViews:
         )
         (problem,) = report.problems
         assert (problem.path, problem.record) == ("files", group.key)
-        assert problem.problem == "has 101 views, a group may have 100; it is left out"
+        assert problem.problem == "has 101 views; the limit is 100: it is left out"
 
 
 class TestPoints:
@@ -80,8 +80,8 @@ class TestPoints:
         assert station.proposed == ("Side line top",)
         assert held.views[1] == make_group(7).views[1]
         assert [problem.message for problem in report.problems] == [
-            f"files, {held.key}, view 7.png, Middle line: has 1,001 of 1,005 points, and a view may "
-            "have 1,000; this marking is left out"
+            f"files, {held.key}, view 7.png, Middle line: has 1,001 of 1,005 points; the limit of a "
+            "view is 1,000: this marking is left out"
         ]
 
     def test_the_densest_markings_go_until_the_others_may_stay(

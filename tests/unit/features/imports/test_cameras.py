@@ -144,7 +144,7 @@ class TestIngestCameras:
         ids = fill(first, replace(second, views=tuple(views)), solved=False)
         report = attach(store, {"7": opposite})
         assert report.changed == 2
-        assert report.problems == ['camera "7" is that of 2 views of this name']
+        assert report.problems == ['camera "7" belongs to 2 views of this name']
         assert all(
             load_group_state(store, each).group.view("7.png").station.given == opposite
             for each in ids

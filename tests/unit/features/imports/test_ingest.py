@@ -324,7 +324,7 @@ class TestAChangedSource:
         assert (report.changed, report.findings) == (0, 0)
         assert load_group_state(store, state.id).group == before
         (problem,) = report.left_out.problems
-        told = "would have 3 views with those that people edited, a group may have 2"
+        told = "would have 3 views with those that people edited; the limit is 2"
         assert told in problem.message
 
     def test_a_static_camera_that_changed_makes_its_groups_stale(

@@ -77,7 +77,7 @@ class TestStation:
         lines = {"Middle line": points, "Side line top": points}
         assert len(_parse_station_record({**value, "lines": lines}).lines) == 2
         with pytest.raises(
-            InputError, match="1,001 points in the lines of cam1, and a view may have 1,000"
+            InputError, match="1,001 points in the lines of cam1; the limit is 1,000"
         ):
             _parse_station_record({**value, "lines": {**lines, "Side line left": points[:1]}})
 
@@ -85,7 +85,7 @@ class TestStation:
 class TestParseGroup:
     @pytest.mark.parametrize(
         ("shared", "said"),
-        [(True, "contains the whole static camera"), ("yes", "neither true nor false")],
+        [(True, "contains the whole static camera"), ("yes", "not true or false")],
     )
     def test_a_static_camera_is_named_by_a_view_and_never_stands_in_it(
         self, shared: Any, said: str

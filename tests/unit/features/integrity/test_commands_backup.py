@@ -100,7 +100,7 @@ class TestTransfer:
     def test_a_file_without_an_address_is_no_place(self, home: Path, file: Path) -> None:
         done = CliRunner().invoke(app, ["transfer", str(home), str(file)])
         assert isinstance(done.exception, InputError)
-        assert str(done.exception) == f"{file} holds no address of a database"
+        assert str(done.exception) == f"{file} contains no address of a database"
 
     @pytest.mark.parametrize("turned", [False, True])
     def test_a_server_that_does_not_answer_cannot_be_reached(

@@ -61,5 +61,5 @@ def test_a_file_that_others_may_read_is_refused(settings: Settings, file: Path) 
 
 def test_a_file_without_an_address_is_refused(settings: Settings, file: Path) -> None:
     file.write_text("db/touchline")
-    with pytest.raises(InputError, match="holds no address of a database"):
+    with pytest.raises(InputError, match="contains no address of a database"):
         make_settings_of_both_databases("home", str(file), settings)

@@ -84,9 +84,13 @@ class TestPicture:
         [
             (("--dataset", "demo", "--as-taken"), 2, "--as-taken needs --match"),
             (("--dataset", "demo", "--match", "final"), 1, "has no match final"),
-            (("--dataset", "demo", "--match", MATCH, "--accept", "--as-taken"), 2, "contradict"),
+            (
+                ("--dataset", "demo", "--match", MATCH, "--accept", "--as-taken"),
+                2,
+                "use either --accept",
+            ),
             (("--dataset", "nothing"), 1, "nothing"),
-            ((), 2, "give either line files or --dataset"),
+            ((), 2, "use either line files or --dataset"),
         ],
     )
     def test_wrong_options_and_unknown_names_are_refused_with_a_sentence(

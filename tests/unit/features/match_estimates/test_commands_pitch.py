@@ -85,8 +85,8 @@ class TestPitch:
                 "there is no earlier pitch size to restore",
             ),
             (("nothing",), 1, "nothing"),
-            ((), 2, "give either line files or --dataset"),
-            (("demo", "--dataset", "demo"), 2, "give either line files or --dataset"),
+            ((), 2, "use either line files or --dataset"),
+            (("demo", "--dataset", "demo"), 2, "use either line files or --dataset"),
         ],
     )
     def test_wrong_options_unknown_names_and_what_is_no_size_are_refused(

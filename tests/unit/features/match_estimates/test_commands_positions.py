@@ -49,7 +49,7 @@ class TestPositions:
             (("demo", "--share", "--match", "final"), 1, "has no match final"),
             (("demo", "--undo"), 2, "--undo needs --match"),
             (("demo", "--undo", "--match", MATCH), 1, "share no camera position"),
-            (("demo", "--undo", "--share"), 2, "one at a time"),
+            (("demo", "--undo", "--share"), 2, "use either --share or --undo"),
         ],
     )
     def test_wrong_options_and_what_cannot_be_shared_or_undone_are_refused(

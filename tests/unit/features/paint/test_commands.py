@@ -118,9 +118,9 @@ class TestOfDataset:
         ("words", "code", "sentence"),
         [
             (("--match", "final"), 1, "has no match final"),
-            (("--show", "--undo"), 2, "one at a time"),
-            (("--size", "960x540"), 2, "name nothing else"),
-            (("--undo", "--match", "m"), 2, "all of a dataset"),
+            (("--show", "--undo"), 2, "use either --show or --undo"),
+            (("--size", "960x540"), 2, "leave out IMAGES, OUT"),
+            (("--undo", "--match", "m"), 2, "--undo deletes all"),
         ],
     )
     def test_wrong_options_and_unknown_matches_are_refused_with_a_sentence(

@@ -55,7 +55,7 @@ class TestPaint:
             (("paper",), 1, "does not use the paint"),
             (("demo", "--match", "final"), 1, "has no match final"),
             (("demo", "--undo"), 1, "has a measurement of its paint"),
-            (("demo", "--undo", "--show"), 2, "one at a time"),
+            (("demo", "--undo", "--show"), 2, "use either --show or --undo"),
         ],
     )
     def test_wrong_options_and_what_cannot_be_read_or_undone_are_refused(

@@ -120,7 +120,7 @@ class TestSets:
     def test_a_file_without_a_ball_is_refused(self, accepted, tmp_path: Path) -> None:
         path = tmp_path / "ball.csv"
         path.write_text("frame,x_m,y_m,z_m\n101,,,\n")
-        with pytest.raises(InputError, match=r"ball\.csv holds no ball"):
+        with pytest.raises(InputError, match=r"ball\.csv contains no ball"):
             add_predictions(accepted, "flight", None, PredictionFiles(path), actor="ann")
 
     def test_cameras_do_not_come_with_tracks(self, accepted, own) -> None:

@@ -90,7 +90,7 @@ class TestPredictionReader:
         other = written(tmp_path / "x.csv", b"a,b")
         with pytest.raises(DatasetFormatError) as refused:
             reader_of().read(other, NAMES, ImportLimits.of(Settings()))
-        assert refused.value.message == "x.csv: holds no COCO results"
+        assert refused.value.message == "x.csv: contains no COCO results"
 
     def test_what_needs_too_much_memory_is_refused_and_the_next_is_read(
         self, reader_of, tmp_path

@@ -75,5 +75,5 @@ def test_the_yield_of_many_groups_is_counted_at_once(
     progress = Told()
     refresh_yield_table(two, "demo", solve_fully(two, "demo", None, progress), progress)
     sentences = [sentence for *_, sentence in progress.calls if sentence]
-    assert sentences == (["Counting what demo yields."] if counted else [])
+    assert sentences == (["Counting the passing groups of demo."] if counted else [])
     assert len(looked) == (2 if counted else 0)
