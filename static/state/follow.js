@@ -99,7 +99,7 @@ function tell(found) {
 export function endFollow() {
 	stop.abort();
 	follow.value = null;
-	announce('What was not accepted of the followed ball was dismissed.');
+	announce('The positions of the followed ball that were not accepted are discarded.');
 }
 
 /** Make followed balls those of their views. @param {FollowedItem[]} items */

@@ -28,7 +28,7 @@ function SessionRow({ one, end }) {
 			<th scope="row">${browserName(one.browser)}${one.this ? html` <strong>(this one)</strong>` : null}<small>${one.address}</small></th>
 			<td><${When} at=${one.created} /></td>
 			<td><${When} at=${one.seen} /></td>
-			<td><span class="table__actions">${one.this ? null : html`<button class="button button--small" type="button" onClick=${() => end(one.id)}>End</button>`}</span></td>
+			<td><span class="table__actions">${one.this ? null : html`<button class="button button--small" type="button" aria-label=${`Log out ${browserName(one.browser)}`} onClick=${() => end(one.id)}>Log out</button>`}</span></td>
 		</tr>
 	`;
 }
@@ -80,7 +80,7 @@ export function AccountPage() {
 							<thead><tr><th>Browser</th><th>Logged in</th><th>Last used</th><td></td></tr></thead>
 							<tbody>${sessions.map((one) => html`<${SessionRow} key=${one.id} one=${one} end=${end} />`)}</tbody>
 						</table>
-						${sessions.length > 1 ? html`<p class="buttons"><button class="button" type="button" onClick=${() => end(null)}>End all other sessions</button></p>` : null}
+						${sessions.length > 1 ? html`<p class="buttons"><button class="button" type="button" onClick=${() => end(null)}>Log out all other sessions</button></p>` : null}
 					</section>
 					<${SecondFactorCard} changed=${read} again=${factors} />
 					<div class="account__ways">

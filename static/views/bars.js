@@ -15,7 +15,7 @@ function BarredBar() {
 	if (waiting.length === 0) return null;
 	return html`
 		<div class="bar" data-tone="bad" role="alert">
-			<p>${plural(waiting.length, 'change')} of yours ${waiting.length === 1 ? 'is' : 'are'} not saved yet: ${waiting[0].barred}. This browser keeps ${waiting.length === 1 ? 'it' : 'them'} until your role allows it.</p>
+			<p>${plural(waiting.length, 'change')} ${waiting.length === 1 ? 'is' : 'are'} not saved: ${waiting[0].barred}. This browser stores ${waiting.length === 1 ? 'it' : 'them'} until your role allows saving.</p>
 			<button class="button" type="button" onClick=${tryBarred}>Try again</button>
 			<button class="button" type="button" onClick=${() => discard((item) => Boolean(item.barred))}>Discard ${waiting.length === 1 ? 'it' : 'them'}</button>
 		</div>

@@ -13,7 +13,7 @@ import { Term } from './term.js';
 
 const ENDS = {
 	lost: 'the ball is lost', left: 'the ball left the picture', known: 'a group has a ball already', end: 'no more groups',
-	limit: 'as far as it was asked: follow again from the last group',
+	limit: 'the limit of groups is reached: follow again from the last one',
 };
 
 /** @param {{found: FollowedBall, here: number | undefined}} props */

@@ -77,7 +77,7 @@ function Plan({ plan, split }) {
 			${split.kind === 'match' && plan.groups ? html`<p class="note">All groups of a match are in the same split, so the share of groups can differ a little from the share of matches.</p>` : null}
 			${plan.unsolved ? html`<p data-grade="warn">${count(plan.unsolved)} ${plan.unsolved === 1 ? 'is' : 'are'} not solved yet.</p>` : null}
 			${plan.tracks ? html`<p>${plural(plan.tracks, 'track')} of the ball ${plan.tracks === 1 ? 'is' : 'are'} included.</p>` : null}
-			${stale ? html`<p data-grade="warn">${plural(stale, 'accepted track')} ${stale === 1 ? 'stays' : 'stay'} out, as groups have changed since (${plan.stale_tracks.slice(0, 5).join(', ')}${stale > 5 ? ', …' : ''}). Make the tracks again and accept them first.</p>` : null}
+			${stale ? html`<p data-grade="warn">${plural(stale, 'accepted track')} ${stale === 1 ? 'stays' : 'stay'} out, as groups have changed since (${plan.stale_tracks.slice(0, 5).join(', ')}${stale > 5 ? ', …' : ''}). Recompute these tracks and accept them first.</p>` : null}
 			${left.length ? html`<ul>${left.map(([why, n]) => html`<li key=${why}>${count(n)} ${n === 1 ? 'stays' : 'stay'} out: ${words(why).replace(': ', ', ')}</li>`)}</ul>` : null}
 		</div>
 	`;

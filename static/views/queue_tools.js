@@ -32,7 +32,7 @@ const FLAGS = [
 ];
 const ORDERS = [
 	{ sort: '', label: 'Order of the dataset', title: 'As the groups were imported' }, { sort: 'value', label: 'Value of review', title: VALUE_OF_REVIEW },
-	{ sort: 'sigma-desc', label: 'Largest σ first', title: 'The least certain ball positions come first' }, { sort: 'newest', label: 'Newest change first', title: 'The groups whose annotations changed last come first; a verdict is no change' },
+	{ sort: 'sigma-desc', label: 'Largest σ first', title: 'The least certain ball positions come first' }, { sort: 'newest', label: 'Newest change first', title: 'The groups whose annotations changed last come first; verdicts do not count' },
 ];
 
 /** @param {{dataset: string, q: string, onQuery: (q: string) => void}} props */

@@ -227,7 +227,7 @@ const NAVIGATE = [
 /** @type {Binding[]} */
 const VIEW = [
 	...DIGITS.map((digit, i) => ({
-		keys: [digit], label: 'Focus a view; again: show it alone', group: 'View',
+		keys: [digit], label: 'Focus a view; press again to show it alone', group: 'View',
 		shown: i === 0 ? '1 … 6' : 'hidden', run: () => focusAt(i),
 	})),
 	...DIGITS.map((digit, i) => ({
@@ -235,7 +235,7 @@ const VIEW = [
 		shown: i === 0 ? 'Shift + 1 … 6' : 'hidden', run: () => toggleIncluded(i),
 	})),
 	{
-		keys: ['z'], label: 'Zoom to the ball; again: whole image; hold: magnifying glass', group: 'View',
+		keys: ['z'], label: 'Zoom to the ball; press again to show the whole image; hold for the magnifying glass', group: 'View',
 		run: zoomToBall,
 		hold: { start: () => { loupe.value = true; }, end: () => { loupe.value = false; } },
 	},
@@ -324,7 +324,7 @@ const EDIT = [
 		run: () => changeBall(toggleOutOfView, ''),
 	},
 	{ keys: ['y'], label: 'Accept the predicted ball, or place it where the other views see it', group: 'Edit', needs: 'annotate', once: true, run: takeBall },
-	{ keys: ['Shift+q'], label: 'Follow the ball of the view through the groups before and after; again: accept what was followed', group: 'Edit', needs: 'annotate', once: true, run: () => { followOrAccept(viewInHand()); } },
+	{ keys: ['Shift+q'], label: 'Follow the ball of the view through the groups before and after; press again to accept the result', group: 'Edit', needs: 'annotate', once: true, run: () => { followOrAccept(viewInHand()); } },
 	{ keys: ['Shift+y'], label: 'Accept predictions in every view without a ball', group: 'Edit', needs: 'annotate', run: acceptAll },
 	{ keys: ['Shift+p'], label: 'Accept the lines that are proposed for the view', group: 'Edit', needs: 'annotate', run: acceptProposed },
 	{ keys: ['u'], label: 'Reset the selected line or ball to the imported one', group: 'Edit', needs: 'annotate', run: () => { revertSelected(); } },

@@ -24,7 +24,7 @@ const SCOPES = /** @type {{name: Scope, action: Action, note: string}[]} */ ([
 	{ name: 'review', action: 'review', note: 'verdicts' },
 	{ name: 'export', action: 'export', note: 'make exports' },
 	{ name: 'lead', action: 'lead', note: 'import, freeze, evaluate, thresholds' },
-	{ name: 'admin', action: 'administer', note: 'list people, end tokens, delete datasets' },
+	{ name: 'admin', action: 'administer', note: 'list people, revoke tokens, delete datasets' },
 ]);
 const DAYS = [7, 30, 90, 365];
 

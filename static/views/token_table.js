@@ -22,7 +22,7 @@ export function TokenTable({ tokens, end }) {
 					<td>${one.dataset ?? 'all datasets'}</td>
 					<td>${one.used ? html`<${When} at=${one.used} />` : 'never'}</td>
 					<td>${one.expired ? 'expired' : dayOf(one.expires)}</td>
-					<td><span class="table__actions"><button class="button button--small ${one.expired ? '' : 'button--danger'}" type="button" aria-label=${`End ${one.name}`} onClick=${() => end(one.id)}>${one.expired ? 'Remove' : 'End'}</button></span></td>
+					<td><span class="table__actions"><button class="button button--small ${one.expired ? '' : 'button--danger'}" type="button" aria-label=${`${one.expired ? 'Remove' : 'Revoke'} ${one.name}`} onClick=${() => end(one.id)}>${one.expired ? 'Remove' : 'Revoke'}</button></span></td>
 				</tr>`)}
 			</tbody>
 		</table></div>

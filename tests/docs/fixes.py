@@ -79,7 +79,7 @@ FINDINGS: dict[str, tuple[tuple[str, ...], str]] = {
     "pitch_size": ((), "`PATCH /datasets/{id}/pitches` with the size that is proposed"),
     "track_disagrees": (
         ("move_ball", "exclude_view"),
-        "`offers` has its other balls too; then make the track again: `POST /datasets/{id}/tracks`",
+        "`offers` has its other balls too; then recompute the track: `POST /datasets/{id}/tracks`",
     ),
 }
 """By the kind of a finding: what it proposes, and what else there is to do."""

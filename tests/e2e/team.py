@@ -51,7 +51,7 @@ def log_in(page: Page, name: str) -> None:
 
 def log_out(page: Page) -> None:
     """Log out, and wait for the page that comes then: the one before may still take keys."""
-    page.get_by_role("button", name="Log out").click()
+    page.get_by_role("button", name="Log out", exact=True).click()
     expect(page.get_by_role("heading", name="Log in")).to_be_visible()
 
 

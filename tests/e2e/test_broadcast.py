@@ -133,7 +133,9 @@ def grouped(page: Page, recording: int, truth: dict[str, Any], known: dict[int, 
         page.keyboard.press("i")
     card.get_by_label("Propose cameras afterwards").uncheck()
     card.get_by_role("button", name="Make 2 groups").click()
-    expect(card).to_contain_text("2 groups made. 2 views of linked replays added.", timeout=LONG_MS)
+    expect(card).to_contain_text(
+        "2 groups created. 2 views of linked replays added.", timeout=LONG_MS
+    )
     jobs_end(page)
     rows = page.request.get("/api/v1/groups?dataset=derby").json()["items"]
     return [row["id"] for row in rows]

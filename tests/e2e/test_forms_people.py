@@ -69,7 +69,7 @@ PEOPLE = [
     ),
     Row(
         "ends one of them",
-        [press("End nightly", "section[aria-labelledby=people-tokens]")],
+        [press("Revoke nightly", "section[aria-labelledby=people-tokens]")],
         {"DELETE /users/{finn}/tokens/{token}": None},
         hides="section[aria-labelledby=people-tokens] tbody tr",
     ),
@@ -273,16 +273,16 @@ ACCOUNT = [
     ),
     Row(
         "ends the first of them",
-        [press("End plain")],
+        [press("Revoke plain")],
         {"DELETE /tokens/{plain}": None},
-        hides="button[aria-label='End plain']",
+        hides="button[aria-label='Revoke plain']",
     ),
     Row(
         "ends a session of the other browser",
         [
             lambda page: (
                 page.locator(f"{SESSIONS} tr", has_text="Firefox")
-                .get_by_role("button", name="End")
+                .get_by_role("button", name="Log out ")
                 .click()
             )
         ],
@@ -291,7 +291,7 @@ ACCOUNT = [
     ),
     Row(
         "ends all other sessions",
-        [press("End all other sessions")],
+        [press("Log out all other sessions")],
         {"DELETE /sessions": None},
         hides=f"{SESSIONS} tr:has-text('Chrome 141')",
     ),

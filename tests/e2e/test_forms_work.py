@@ -67,8 +67,8 @@ GIVING = [
             press("Assign…"),
             fill("Name", "Twice", DIALOG),
             fill("Annotators per group", "2", DIALOG),
-            fill("One gold group in every N of an annotator", "4", DIALOG),
-            choose("Gold groups are", "sample", DIALOG),
+            fill("Gold groups: one in every N groups of an annotator", "4", DIALOG),
+            choose("Use as gold groups", "sample", DIALOG),
             choose("A copy of a gold group starts with", "without_balls", DIALOG),
             tick("bob", ANNOTATORS),
             tick("carl", ANNOTATORS),
@@ -100,7 +100,7 @@ BATCHES = [
             press("Reassign… Friday"),
             fill("Name", "Saturday", DIALOG),
             fill("Due", (DUE + timedelta(days=1)).isoformat(), DIALOG),
-            fill("One gold group in every N of an annotator", "5", DIALOG),
+            fill("Gold groups: one in every N groups of an annotator", "5", DIALOG),
             tick("carl", ANNOTATORS, on=False),
             tick("dora", ANNOTATORS),
             tick("bob", REVIEWERS, on=False),
@@ -122,7 +122,7 @@ BATCHES = [
         [
             press("Reassign… Saturday"),
             fill("Due", "", DIALOG),
-            fill("One gold group in every N of an annotator", "", DIALOG),
+            fill("Gold groups: one in every N groups of an annotator", "", DIALOG),
             press("Save", DIALOG),
         ],
         {

@@ -564,7 +564,7 @@ class TestLinking:
         card.get_by_label("Propose cameras afterwards").uncheck()
         card.get_by_role("button", name="Make 2 groups").click()
         expect(card).to_contain_text(
-            "2 groups made. 1 view of linked replays added. 1 view missing, because the replay does not show the instant."
+            "2 groups created. 1 view of linked replays added. 1 view missing, because the replay does not show the instant."
         )
         jobs_end(page)
         rows = page.request.get("/api/v1/groups?dataset=cup").json()["items"]
@@ -625,7 +625,9 @@ class TestPages:
         page = opened(open_page, recording)
         page.keyboard.press("?")
         expect(page.get_by_role("dialog")).to_contain_text("Split the shot at this frame")
-        expect(page.get_by_role("dialog")).to_contain_text("Play forwards; again: twice as fast")
+        expect(page.get_by_role("dialog")).to_contain_text(
+            "Play forwards; press again to double the speed"
+        )
 
     def test_a_recording_that_is_gone_says_so(self, open_page: OpenPage, console: Any) -> None:
         console.expect("404 (Not Found)")

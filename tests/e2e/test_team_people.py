@@ -172,7 +172,7 @@ class TestPeople:
         with refusing(page, "**/api/v1/session", "**/api/v1/events*"):
             in_store(team_home, lambda store: give(store, "vera", Role.VIEWER))
             page.keyboard.press("s")
-            bar = page.get_by_role("alert").filter(has_text="not saved yet")
+            bar = page.get_by_role("alert").filter(has_text="not saved:")
             expect(bar).to_contain_text("needs the role reviewer")
             assert verdict(page, 3)["state"] is None
         page.evaluate("() => dispatchEvent(new Event('focus'))")

@@ -57,8 +57,8 @@ class TestSessions:
         assert (kept["dataset"], (expires - created).days) == ("sample", 30)
         assert kept["scopes"] == ["read", "export"]
         assert serious_in_both(page) == []
-        page.get_by_role("button", name="End nightly").click()
-        expect(page.get_by_role("button", name="End nightly")).to_be_hidden()
+        page.get_by_role("button", name="Revoke nightly").click()
+        expect(page.get_by_role("button", name="Revoke nightly")).to_be_hidden()
         assert httpx.get(f"{team}/api/v1/datasets", headers=given).status_code == 401
 
         page.locator("#factor-begin").fill(SECRET)
@@ -173,7 +173,7 @@ class TestSessions:
         defer_as_the_session_ends(page, team_home, "rita")
         again = page.get_by_role("dialog", name="Your session has ended")
         expect(again).to_be_visible()
-        expect(again).to_contain_text("1 change of yours waits")
+        expect(again).to_contain_text("1 unsaved change")
         assert serious_in_both(page) == []
         page.get_by_label("Password").fill(SECRET)
         page.keyboard.press("Enter")

@@ -96,7 +96,7 @@ export const EDITOR_KEYS = [
 	...['1', '2', '3', '4', '5', '6'].map((digit, i) => ({
 		keys: [digit], label: 'Another view', group: 'Choose', shown: i === 0 ? '1 … 6' : 'hidden', run: () => goToView(i),
 	})),
-	{ keys: ['z'], label: 'Zoom to the point; again: whole image', group: 'View', run: zoomToPoint },
+	{ keys: ['z'], label: 'Zoom to the point; press again to show the whole image', group: 'View', run: zoomToPoint },
 	{ keys: ['0'], label: 'Whole image', group: 'View', run: () => { if (view.value) fitPanel(panelKey(view.value.letter)); } },
 	{ keys: ['h'], label: 'Hide or show all overlays', group: 'View', run: () => { overlaysHidden.value = !overlaysHidden.value; } },
 	{ keys: ['p'], label: 'Projected lines', group: 'View', run: () => { projections.value = !projections.value; } },
@@ -106,5 +106,5 @@ export const EDITOR_KEYS = [
 	{ keys: ['Ctrl+z'], label: 'Undo; staged changes first', group: 'Save', run: undo },
 	{ keys: ['Ctrl+Shift+z', 'Ctrl+y'], label: 'Redo', group: 'Save', run: redo },
 	{ keys: ['Ctrl+Delete', 'Ctrl+Backspace'], label: 'Discard everything staged', group: 'Save', run: discardStaged },
-	{ keys: ['Escape'], label: 'Cancel the current step; again: back to the review', group: 'Save', typing: true, run: escape },
+	{ keys: ['Escape'], label: 'Cancel the current step; press again to return to the review', group: 'Save', typing: true, run: escape },
 ];

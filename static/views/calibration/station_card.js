@@ -20,7 +20,7 @@ export function StationCard({ view, station, dataset }) {
 	return html`
 		<section class="card station-card" aria-label="Static camera">
 			<h2>Static camera ${view.station.key}</h2>
-			<p>What is saved here changes its view in <strong>${all}</strong>. This group is shown at once, the others are solved in the background.</p>
+			<p>Saving changes the view of this camera in <strong>${all}</strong>. This group is updated at once, the others are solved in the background.</p>
 			<p><button data-needs="lead" class="button button--small" type="button" onClick=${() => setAdjusting(true)}>Adjust all static cameras…</button></p>
 			${adjusting ? html`<${RigDialog} dataset=${dataset} station=${view.station.id} onClose=${() => setAdjusting(false)} />` : null}
 			${work ? html`

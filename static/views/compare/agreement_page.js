@@ -213,9 +213,9 @@ function BatchChoice({ dataset, batch, choose }) {
 	return html`
 		<p class="agreement__choice"><label for="agreement-batch">Results of</label>
 			<select class="field" id="agreement-batch" value=${batch ?? ''} onChange=${withValue((text) => choose(text === '' ? null : Number(text)))}>
-				<option value="">all batches, and no batch</option>
+				<option value="">all groups, with and without a batch</option>
 				${several.map(({ id, name, state }) => html`<option key=${id} value=${id}>${name}${state === 'closed' ? ' (closed)' : ''}</option>`)}
-				<option value="0">no batch</option>
+				<option value="0">groups without a batch</option>
 			</select></p>
 	`;
 }

@@ -34,7 +34,7 @@ const KEYS = [
 	{ keys: ['p'], label: 'Projected lines', group: 'View', run: () => { projections.value = !projections.value; } },
 	{ keys: ['b'], label: 'Ball boxes', group: 'View', run: () => { boxes.value = !boxes.value; } },
 	{ keys: ['w'], label: 'Error lines × 1, 5, 20', group: 'View', run: () => { cycleGain(); announce(`Error lines are drawn ${gain.value} times as long.`); } },
-	{ keys: ['z'], label: 'Zoom to the ball in all pictures; again: whole images', group: 'View', run: zoomIn },
+	{ keys: ['z'], label: 'Zoom to the ball in all pictures; press again to show the whole images', group: 'View', run: zoomIn },
 	{ keys: ['0'], label: 'Leave the zoom', group: 'View', run: fitAll },
 ];
 
@@ -61,7 +61,7 @@ function Toggle({ label, on, letter, flip }) {
 /** What is shown in the pictures. */
 function Toggles() {
 	return html`
-		<div class="buttons compare__toggles" role="group" aria-label="What the pictures show">
+		<div class="buttons compare__toggles" role="group" aria-label="Overlays">
 			<${Toggle} label="The other’s" letter="O" on=${others.value} flip=${() => { others.value = !others.value; }} />
 			<${Toggle} label="Projected lines" letter="P" on=${projections.value} flip=${() => { projections.value = !projections.value; }} />
 			<${Toggle} label="Boxes" letter="B" on=${boxes.value} flip=${() => { boxes.value = !boxes.value; }} />

@@ -85,7 +85,7 @@ export function AcceptPredictions({ one, set, onClose }) {
 			<p>The prediction with the highest score of each view becomes its annotation, as an edit that can be undone.</p>
 			<div class="form__row"><label for="accept-q">Groups (a query as in the queue)</label><input class="field mono" id="accept-q" placeholder="every group; gate:ball for those without enough balls" value=${typed.q} autocomplete="off" spellcheck=${false} onInput=${withValue((text) => setTyped({ ...typed, q: text }))} /></div>
 			<div class="form__row"><label for="accept-score">Smallest score</label><input class="field" id="accept-score" type="number" min="0" max="1" step="any" defaultValue=${String(typed.min_score)} onInput=${withValue((text) => setTyped({ ...typed, min_score: Number(text) }))} /></div>
-			<label class="form__check"><input type="checkbox" checked=${typed.replace} onChange=${withTick((replace) => setTyped({ ...typed, replace }))} />Also where the view has another ball</label>
+			<label class="form__check"><input type="checkbox" checked=${typed.replace} onChange=${withTick((replace) => setTyped({ ...typed, replace }))} />Replace existing balls</label>
 			${plan.value ? html`<${Plan} plan=${plan.value} />` : null}
 			${state.error || plan.error ? html`<p class="form__error" role="alert">${state.error || sentenceOf(plan.error)}</p>` : null}
 		<//>

@@ -139,7 +139,7 @@ function timeline(context, position) {
 const TIMELINE = {
 	title: 'Timeline of static cameras',
 	rows: [
-		{ name: 'Error and limit', meaning: 'A bar for each moment: blue passes, red fails (with a second mark on top); the dashed orange line is the limit, grey on top is not solved.', tokens: 'ok bad warn muted line', draw: (context) => timeline(context, -1) },
+		{ name: 'Error and limit', meaning: 'A bar for each moment: blue passes, red fails (with a second mark above it); the dashed orange line is the limit, grey on top is not solved.', tokens: 'ok bad warn muted line', draw: (context) => timeline(context, -1) },
 		{ name: 'Verdicts', meaning: 'Blocks at the foot: full is accepted, lower half rejected, upper half deferred; orange where something changed since.', tokens: 'ok bad muted warn', draw: (context) => timeline(context, -1) },
 		{ name: 'Playhead', meaning: 'The group that is on screen.', tokens: 'focus', draw: (context) => timeline(context, 4) },
 	],

@@ -24,8 +24,8 @@ import { JobProgress } from '../job_progress.js';
 /** What became of them, in words. @param {JobJson['result']} result */
 function madeText({ new: made, changed, unchanged, linked_views: views, outside, dry_run: dry }) {
 	return [
-		dry ? 'Dry run, nothing was saved. It would be:' : '',
-		`${plural(made, 'group')} made.`,
+		dry ? 'Dry run, nothing was saved. The result would be:' : '',
+		`${plural(made, 'group')} created.`,
 		changed ? `${plural(changed, 'group')} got views of replays.` : '',
 		unchanged ? `${plural(unchanged, 'frame')} ${unchanged === 1 ? 'was already a group and was not changed' : 'were already groups and were not changed'}.` : '',
 		views ? `${plural(views, 'view')} of linked replays added.` : '',
@@ -71,7 +71,7 @@ export function InstantsCard({ one, running: { jobs, watch }, shot, instants, li
 				<label for="instants-step">Every</label>
 				<input class="field film__step" id="instants-step" name="step" type="number" min="1" max="100000" required defaultValue=${Math.round(one.fps ?? 25)} />
 				<span>frames</span>
-				<button class="button" type="submit" title="Chooses every so many frames of this shot">Choose</button>
+				<button class="button" type="submit" title="Choose every N-th frame of this shot as an instant">Choose</button>
 			</form>
 			<label class="form__check"><input type="checkbox" checked=${propose} onChange=${withTick(setPropose)} />Propose cameras afterwards</label>
 			${usable ? html`<label class="form__check"><input type="checkbox" checked=${linked} onChange=${withTick(setLinked)} />With the views of ${plural(usable, 'linked replay')}</label>` : null}

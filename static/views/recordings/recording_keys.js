@@ -29,9 +29,9 @@ export function keysOfRecording(one, shots, doing) {
 	const [look, edit] = ['Recording', 'Shots'];
 	return [
 		{ keys: [' '], label: 'Play or stop', group: look, shown: 'Space', run: toggleRunning },
-		{ keys: ['l'], label: 'Play forwards; again: twice as fast', group: look, run: () => run(1) },
+		{ keys: ['l'], label: 'Play forwards; press again to double the speed', group: look, run: () => run(1) },
 		{ keys: ['k'], label: 'Stop', group: look, run: stand },
-		{ keys: ['j'], label: 'Play backwards; again: twice as fast', group: look, run: () => run(-1) },
+		{ keys: ['j'], label: 'Play backwards; press again to double the speed', group: look, run: () => run(-1) },
 		{ keys: ['ArrowRight'], label: 'Next frame', group: look, run: () => { stepBy(1); } },
 		{ keys: ['ArrowLeft'], label: 'Previous frame', group: look, run: () => { stepBy(-1); } },
 		{ keys: ['Shift+ArrowRight'], label: 'One second forward', group: look, run: () => { stepBy(second); } },
@@ -46,6 +46,6 @@ export function keysOfRecording(one, shots, doing) {
 		{ keys: ['a'], label: 'Keep the shot', group: edit, needs: 'annotate', run: () => set({ kept: true }, 'The shot is kept.') },
 		{ keys: ['x'], label: 'Drop the shot', group: edit, needs: 'annotate', run: () => set({ kept: false }, 'The shot is dropped.') },
 		{ keys: ['Ctrl+z'], label: 'Undo the last change of the shots', group: edit, needs: 'annotate', run: () => doing.current.undo() },
-		{ keys: ['i'], label: 'Choose this frame as an instant; again: do not', group: edit, run: () => doing.current.turn(wanted.value) },
+		{ keys: ['i'], label: 'Choose this frame as an instant; press again to remove it', group: edit, run: () => doing.current.turn(wanted.value) },
 	];
 }

@@ -46,7 +46,7 @@ export function sceneKeys(stage, { turns, leave, digits } = REVIEW) {
 		{ keys: ['9'], label: 'From the goal', group: '3D', run: () => goToPreset('goal') },
 		{ keys: ['z'], label: 'At the ball', group: '3D', run: () => goToPreset('ball') },
 		...(digits ? ['1', '2', '3', '4', '5', '6'] : []).map((digit, i) => ({
-			keys: [digit], label: 'Look through a camera; again: step back', group: '3D',
+			keys: [digit], label: 'Look through a camera; press again to step back', group: '3D',
 			shown: i === 0 ? '1 … 6' : 'hidden', run: () => throughCamera(i),
 		})),
 		{ keys: ['Escape'], label: 'Step back out of a camera, then to the images', group: '3D', run: () => stepBack(leave) },

@@ -16,5 +16,5 @@ const hasTimeline = () => isStatic.value && stripTab.value === 'timeline';
 export const TIMELINE_KEYS = [
 	{ keys: ['Shift+j'], label: 'Close-ups of ball and lines, or the timeline', group: 'View', when: () => isStatic.value, run: switchTab },
 	{ keys: [' '], label: 'Play the frames or stop', group: 'Navigate', shown: 'Space', when: hasTimeline, run: togglePlaying },
-	{ keys: ['j'], label: 'Worst frame; again: the next worst', group: 'Navigate', when: hasTimeline, run: goToWorst },
+	{ keys: ['j'], label: 'Worst frame; press again for the next worst', group: 'Navigate', when: hasTimeline, run: goToWorst },
 ];

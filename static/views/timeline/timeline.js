@@ -152,7 +152,7 @@ export function Timeline() {
 			<h2>Reprojection error, frame by frame<span class="card__aside">${all ? totals(all) : ''}</span></h2>
 			<div class="timeline__tools" role="toolbar" aria-label="Timeline">
 				<button class="button" type="button" aria-pressed=${playing.value} onClick=${togglePlaying}>${playing.value ? 'Stop' : 'Play'} <kbd>Space</kbd></button>
-				<button class="button" type="button" title="The frame with the largest reprojection error; again: the next" onClick=${goToWorst}>Worst frame <kbd>J</kbd></button>
+				<button class="button" type="button" title="The frame with the largest reprojection error; press again for the next" onClick=${goToWorst}>Worst frame <kbd>J</kbd></button>
 				<button class="button" type="button" aria-label="Zoom in" title="Zoom in (wheel)" onClick=${() => zoomSpan(0.5)}>+</button>
 				<button class="button" type="button" aria-label="Zoom out" title="Zoom out (wheel)" onClick=${() => zoomSpan(2)}>−</button>
 				${trackAround.value ? html`<span class="timeline__track"><span aria-hidden="true">◆</span> left-out error of the track, with the groups as they are now</span>` : null}

@@ -31,7 +31,7 @@ export function AssignTracks({ dataset, id, tracks, onClose, onDone }) {
 		}), (made) => {
 			onClose();
 			onDone();
-			inform(`“${made.name}” is assigned: ${plural(made.groups, 'track')}.`, { label: 'See the work', run: () => navigate('/work') });
+			inform(`Batch “${made.name}” created with ${plural(made.groups, 'track')}.`, { label: 'See the work', run: () => navigate('/work') });
 		});
 	}
 	return html`
@@ -39,10 +39,10 @@ export function AssignTracks({ dataset, id, tracks, onClose, onDone }) {
 			title="Assign tracks" onClose=${onClose} onSubmit=${send}
 			buttons=${html`<button class="button button--primary" type="submit" aria-disabled=${busy}>Assign</button>`}
 		>
-			<p>${plural(tracks.length, 'track')} of the list without a verdict, in the order of the list.</p>
+			<p>The batch gets the ${plural(tracks.length, 'track')} of the list that ${tracks.length === 1 ? 'has' : 'have'} no verdict, in the order of the list.</p>
 			<div class="form__row"><label for="batch-name">Name</label><input class="field" id="batch-name" name="name" required maxlength="80" autocomplete="off" /></div>
 			<div class="form__columns">
-			<div class="form__row"><label for="batch-size">Number of tracks (the first of the list)</label><input class="field" id="batch-size" name="size" type="number" min="1" max="10000" placeholder=${`all ${tracks.length}`} /></div>
+			<div class="form__row"><label for="batch-size">Number of tracks, from the top of the list</label><input class="field" id="batch-size" name="size" type="number" min="1" max="10000" placeholder=${`all ${tracks.length}`} /></div>
 			<div class="form__row"><label for="batch-due">Due</label><input class="field" id="batch-due" name="due" type="date" /></div>
 			</div>
 			<label class="form__check"><input type="checkbox" name="skip" defaultChecked /> Skip tracks that are in another open batch</label>

@@ -36,9 +36,9 @@ export function keysOfTrack(doing) {
 	const second = () => Math.round(doing.current.track.summary.rate);
 	return [
 		{ keys: [' '], label: 'Play or stop', group: look, shown: 'Space', run: () => doing.current.player.toggle() },
-		{ keys: ['l'], label: 'Play forwards; again: twice as fast', group: look, run: () => doing.current.player.run(1) },
+		{ keys: ['l'], label: 'Play forwards; press again to double the speed', group: look, run: () => doing.current.player.run(1) },
 		{ keys: ['k'], label: 'Stop', group: look, run: () => doing.current.player.stand() },
-		{ keys: ['j'], label: 'Play backwards; again: twice as fast', group: look, run: () => doing.current.player.run(-1) },
+		{ keys: ['j'], label: 'Play backwards; press again to double the speed', group: look, run: () => doing.current.player.run(-1) },
 		{ keys: [','], label: 'Play more slowly', group: look, run: () => doing.current.player.changePace(-1) },
 		{ keys: ['.'], label: 'Play faster', group: look, run: () => doing.current.player.changePace(1) },
 		{ keys: ['\\'], label: '3D and top view, or the curves', group: look, run: () => doing.current.switchView() },

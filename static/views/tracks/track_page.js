@@ -132,7 +132,7 @@ function Now({ around, at }) {
 	return html`
 		<div class="track__now" data-around=${at}>
 			<p><strong>With the present groups:</strong> ${around.reason ?? where ?? 'not known'}${typeof left === 'number' ? `, left-out error ${fixed(left, 1)} px` : ''}.</p>
-			<p class="note">Dashed in the curves, frames ${around.frame[0]} to ${around.frame.at(-1)}. The saved track stays as it is until it is made again.</p>
+			<p class="note">Dashed in the curves, frames ${around.frame[0]} to ${around.frame.at(-1)}. The saved track stays as it is until it is recomputed.</p>
 		</div>
 	`;
 }
@@ -172,7 +172,7 @@ function FrameCard({ track, frames, around, at, goTo }) {
 /** @param {{track: TrackJson, judge: (verdict: 'accepted' | 'rejected' | 'none') => void}} props */
 function VerdictCard({ track, judge }) {
 	const { summary } = track;
-	const why = track.stale ? 'Its groups have changed: make the track again first' : '';
+	const why = track.stale ? 'Its groups have changed: recompute the track first' : '';
 	/** @param {'accepted' | 'rejected'} verdict */
 	const press = (verdict) => judge(track.verdict === verdict ? 'none' : verdict);
 	return html`
@@ -373,7 +373,7 @@ export function TrackPage() {
 		>
 			${found.error ? html`<${Trouble} title="This track cannot be shown" error=${found.error} retry=${found.reload} />` : null}
 			${!track && !found.error ? html`<${Loading} what="the track" />` : null}
-			${track?.summary.reason ? html`<section class="card empty" role="alert"><h2>This stretch has no track</h2><p>${track.summary.reason}</p><p>Annotate the ball in more of its frames, then make its track again.</p><p><a class="button" href=${pageAddress(track.dataset, 'tracks')}>Tracks of ${track.dataset}</a></p></section>` : null}
+			${track?.summary.reason ? html`<section class="card empty" role="alert"><h2>This stretch has no track</h2><p>${track.summary.reason}</p><p>Annotate the ball in more of its frames, then recompute the track.</p><p><a class="button" href=${pageAddress(track.dataset, 'tracks')}>Tracks of ${track.dataset}</a></p></section>` : null}
 			${track && !track.summary.reason ? html`<${Track} key=${track.id} track=${track} setTrack=${setChanged} />` : null}
 		<//>
 	`;

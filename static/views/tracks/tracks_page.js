@@ -88,7 +88,7 @@ function Tracks({ one }) {
 		<section class="card" aria-labelledby="tracks-title">
 			<h2 id="tracks-title">The ball over time</h2>
 			<p class="note">A stretch is a series of groups that follow each other in time: frames of static cameras, or of one shot of a recording. The ball is tracked over each stretch. Its left-out error tells how good a track is: balls are left out in turn and predicted from the others.</p>
-			<p class="buttons"><${JobButton} kind="button--primary" busy=${job !== null && !isOver(job)} act=${make}>${items.length || chosen ? 'Make the tracks again' : 'Track the ball'}<//>${open.length ? html`<button class="button" type="button" data-needs="lead" aria-disabled=${found.waiting} title=${found.waiting ? 'The list is being read' : ''} onClick=${() => { if (!found.waiting) setGiving(true); }}>Assign…</button>` : null}</p>
+			<p class="buttons"><${JobButton} kind="button--primary" busy=${job !== null && !isOver(job)} act=${make}>${items.length || chosen ? 'Recompute the tracks' : 'Track the ball'}<//>${open.length ? html`<button class="button" type="button" data-needs="lead" aria-disabled=${found.waiting} title=${found.waiting ? 'The list is being read' : ''} onClick=${() => { if (!found.waiting) setGiving(true); }}>Assign…</button>` : null}</p>
 			${error ? html`<${FormError} error=${error} />` : null}
 			${job ? html`<${JobProgress} job=${job} />` : null}
 		</section>

@@ -43,12 +43,12 @@ function GoldFields({ dataset }) {
 	const [some, setSome] = useState(false);
 	const versions = useResource(async (signal) => (some ? getVersions(dataset.id, signal) : null), [dataset.id, some]);
 	return html`
-		<div class="form__row"><label for="batch-gold">One gold group in every N of an annotator</label><input class="field" id="batch-gold" name="gold" type="number" min="1" max="1000" placeholder="none" onInput=${withValue((text) => setSome(text !== ''))} /></div>
+		<div class="form__row"><label for="batch-gold">Gold groups: one in every N groups of an annotator</label><input class="field" id="batch-gold" name="gold" type="number" min="1" max="1000" placeholder="none" onInput=${withValue((text) => setSome(text !== ''))} /></div>
 		${some ? html`
-			<div class="form__row"><label for="batch-truth">Gold groups are</label><select class="field" id="batch-truth" name="truth">
-				<option value="">marked by leads</option>
-				<option value="sample">also those of a sample: true cameras and ball</option>
-				${versions.value?.items.map(({ name }) => html`<option key=${name} value=${`v:${name}`}>also those of ${name} on which people agreed</option>`)}
+			<div class="form__row"><label for="batch-truth">Use as gold groups</label><select class="field" id="batch-truth" name="truth">
+				<option value="">groups that leads marked as gold</option>
+				<option value="sample">also groups of a sample, whose cameras and ball are known</option>
+				${versions.value?.items.map(({ name }) => html`<option key=${name} value=${`v:${name}`}>also groups of ${name} on which annotators agreed</option>`)}
 			</select></div>
 			<div class="form__row"><label for="batch-start">A copy of a gold group starts with</label><select class="field" id="batch-start" name="start">
 				${STARTS.map(([name, words]) => html`<option key=${name} value=${name}>${words}</option>`)}
@@ -73,7 +73,7 @@ export function BatchDialog({ dataset, q, total, ticked, onClose }) {
 		})), (made) => {
 			clearTicks();
 			onClose();
-			inform(`“${made.name}” is assigned: ${plural(made.groups, 'group')}.`, { label: 'See the work', run: () => navigate('/work') });
+			inform(`Batch “${made.name}” created with ${plural(made.groups, 'group')}.`, { label: 'See the work', run: () => navigate('/work') });
 		});
 	}
 	return html`
