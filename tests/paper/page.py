@@ -53,11 +53,11 @@ faults go through the real pipeline: calibration from lines, triangulation, gate
 and then the real evaluation. {counts["groups"]} groups pass the policy `paper`; {counts["with_3d_ball"]} of their {counts["frames"]} frames have a 3D ball. The
 truth is known exactly, so the tight box of the true ball takes the place of a manual reference box.
 
-**What this is not.** There is no detector here. What stands for YOLO is a **simulated detector**:
+**What this is not.** There is no detector here. A **simulated detector** takes the place of YOLO:
 true boxes with seeded noise (missed {simulated.MISSED:.0%}, {simulated.FALSE_ALARMS:g} false alarms a frame, size noise {simulated.SIZE_NOISE:.0%}, centre noise
 {simulated.PLACE_NOISE_PX:g} px + {simulated.PLACE_NOISE_SHARE:.0%} of the diameter). Both detectors find and miss the same balls with the same noise; they
-differ in one thing alone, the looseness that they learnt: the mean ratio of their training boxes to
-the true ones, {study.looseness[0]:.3f} for annotated and {study.looseness[1]:.3f} for optimised boxes. So the table of localisation shows what loose
+differ only in how loose their boxes are: the mean ratio of their training boxes to the true ones
+is {study.looseness[0]:.3f} for annotated and {study.looseness[1]:.3f} for optimised boxes. So the table of localisation shows what loose
 boxes do to a place in 3D, and nothing about how well a network finds balls. `docs/detector.md` has
 the commands for a real one.
 
@@ -185,9 +185,9 @@ def _calibration(study: Study) -> Iterator[str]:
 
 def _direction(directions: Directions | None) -> Iterator[str]:
     yield from """
-**Which way JaC is measured.** The public evaluator, and Touchline with it, asks whether every *annotated* point lies
-near the projected marking. The paper's text asks the other way: whether every point of the *projected* marking lies near
-the annotated one, which fails wherever nobody clicked up to a marking's end.""".splitlines()
+**Which way JaC is measured.** The public evaluator and Touchline test whether every *annotated* point lies near the
+projected marking. The paper's text asks the other way: whether every point of the *projected* marking lies near the
+annotated one. That test fails where the annotation does not reach the end of the marking.""".splitlines()
     if directions is not None:
         yield (
             f"On {directions.frames} real frames the same cameras reach JaC 0.5 % {directions.public:.2f} "
