@@ -170,7 +170,7 @@ class ConflictError(ReviewError):
 
 
 class StaleRevisionError(ConflictError):
-    """Somebody else changed the group (or station) first.
+    """The group (or station) was changed by somebody else first.
 
     Args:
         base_etag: The state the caller built on.
@@ -207,7 +207,7 @@ class SharedStationError(ConflictError):
 
 
 class HeldGroupError(ConflictError):
-    """Somebody else has a group of a batch open.
+    """A group of a batch is open by somebody else.
 
     Args:
         message: Names them.
@@ -252,11 +252,11 @@ class ClusterError(ReviewError):
 
 
 class AccessError(ReviewError):
-    """Who asks may not have it."""
+    """The person who sends the request lacks the permission."""
 
 
 class NotLoggedInError(AccessError):
-    """Nobody has said who asks, or the session that said it has ended."""
+    """The request has no login, or its session has ended."""
 
 
 class ForbiddenError(AccessError):

@@ -206,7 +206,7 @@ def list_station_entries(session: Session, station_id: int) -> list[LogEntry]:
 
 
 def filter_groups_with_history(session: Session, group_ids: Sequence[int]) -> set[int]:
-    """Those of the groups of which more was said than their first import, but for verdicts and comments."""
+    """The groups with log entries after their first import, other than verdicts and comments."""
     statement = (
         select(LogModel.group_id)
         .where(LogModel.group_id.in_(group_ids), _CHANGES)

@@ -47,7 +47,7 @@ THREADS = 8
 
 
 def get_current_login(scope: Mapping[str, Any]) -> Login | None:
-    """Who is logged in; None on a server that somebody runs alone."""
+    """The login of the request; None on a server without accounts."""
     found: Login | None = scope.get(LOGIN)
     return found
 

@@ -258,7 +258,7 @@ async def get_actor(
         ),
     ] = None,
 ) -> str:
-    """Who acts: the person who is logged in, or whose token it is.
+    """The actor of the request: the person who is logged in, or the owner of the token.
 
     On a server without accounts it is the single user, or a script by its name.
 

@@ -42,7 +42,7 @@ STREAM: Responses = {
 
 
 async def find_listening_person(request: Request) -> str | None:
-    """Who asks, themselves or by a token; None on a server without accounts."""
+    """The login of the request, by session or token; None on a server without accounts."""
     login = get_current_login(request.scope)
     return None if login is None else login.name
 

@@ -50,7 +50,7 @@ class RoleScope(StrEnum):
 
 @dataclass(frozen=True)
 class Permission:
-    """Who may ask a route.
+    """The permission that a route needs.
 
     Attributes:
         action: What it does; None: anybody may, also before they have logged in.
@@ -109,7 +109,7 @@ def open_to_all(endpoint: E) -> E:
 
 
 def find_permission(endpoint: Callable[..., Any]) -> Permission | None:
-    """Who may ask a route, by the function that answers; None: nobody has said."""
+    """The permission of a route, by its function; None: none is declared."""
     found: Permission | None = getattr(endpoint, _PERMISSION, None)
     return found
 

@@ -23,7 +23,7 @@ class FieldProblem(BaseModel):
 
 
 class GroupViewerDocument(Document):
-    """Somebody who has a group of a batch open."""
+    """The person who has a group of a batch open."""
 
     person: str
     since: datetime

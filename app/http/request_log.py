@@ -84,7 +84,7 @@ def find_client_address(scope: Scope) -> str:
 
 
 def find_person_of_request(scope: Scope) -> str | None:
-    """Who asks, as the log of changes calls them; None for a stranger on a team's server."""
+    """The actor of the request, as named in the log of changes; None without a login on a team's server."""
     is_team = getattr(scope["app"].state, "team", None) is not None
     found: str | None = scope.get(ASKS, None if is_team else LOCAL_USER)
     return found

@@ -225,12 +225,12 @@ class TeamLogin:
         return self.cookies.read_session_token(request.scope)
 
     def find_login(self, request: Request) -> Login | None:
-        """Who that is, on a route that anybody may ask."""
+        """The login of the request, on a route that is open to all."""
         token = self.get_session_token(request)
         return self.logins.find(token) if token else None
 
     def find_login_by_token(self, token: str, request: Request) -> Login:
-        """Who asks with a token.
+        """The login of a request with a token.
 
         Raises:
             NotLoggedInError: It is not valid.

@@ -203,7 +203,7 @@ def read_paint_of_image(
 
 
 def drop_boxes_larger_than_a_person(people: Sequence[Box], size: ImageSize) -> list[Box]:
-    """Those that can be of somebody on the field, and not of the field or a goal."""
+    """The boxes that can be of a person on the field, and not of the field or a goal."""
     largest = LARGEST_PERSON * size.width * size.height
     return [box for box in people if box.width * box.height <= largest]
 

@@ -7,7 +7,7 @@ import re
 from app.errors import InputError
 
 LOCAL_USER = "local"
-"""Who acts in single-user mode."""
+"""The actor in single-user mode."""
 SCRIPT = "script:"
 """How the name of a script begins, so that none passes for a person."""
 TOKEN = " (token "

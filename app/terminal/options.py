@@ -57,7 +57,7 @@ def parse_path_or_store_address(text: str) -> str:
 
 
 def get_current_actor() -> str:
-    """Who acts in this command: the local user, or the script that `--actor` names."""
+    """The actor of this command: the local user, or the script that `--actor` names."""
     return _ACTING.get()
 
 

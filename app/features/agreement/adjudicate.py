@@ -219,7 +219,7 @@ def return_for_correction(
 def _possible_judges(
     store: Store, dataset: int, annotations: Sequence[IndependentAnnotation]
 ) -> list[str]:
-    """Who may judge in a dataset and annotated none of these."""
+    """The people who may judge in a dataset and made none of these annotations."""
     takers = {annotation.person for annotation in annotations}
     return [
         one.name

@@ -59,7 +59,7 @@ log = structlog.get_logger("touchline.agreement")
 REQUIRED = 2
 """Annotations that are compared where no batch says how many."""
 BY_ITSELF = f"{SCRIPT}agreement"
-"""Who takes over what agrees."""
+"""The actor that adopts annotations that agree."""
 
 
 @dataclass(frozen=True)

@@ -106,7 +106,7 @@ def get_audit(
     cursor: Cursor = None,
     before: Before = None,
 ) -> AuditPage:
-    """Who said and did what, the newest first; of all datasets that one leads, or of one.
+    """The audit log, newest first: of all datasets that the person leads, or of one.
 
     A search looks through 20,000 entries at a time: a page may hold fewer than asked for, or none,
     and have a `next` all the same.

@@ -20,7 +20,7 @@ _OVER = ("accepted", "rejected")
 _BATCH = BatchModel.__table__
 _IS_SINGLE = (_BATCH.c.state == OPEN, _BATCH.c.verdicts == 1)
 _TELLS = exists().where(WebhookModel.dataset_id == _BATCH.c.dataset_id, WebhookModel.off.is_(None))
-"""Somebody wants to know what becomes of a batch."""
+"""The dataset of the batch has an active webhook."""
 # What every verdict asks is put together once: that takes longer than to answer it.
 _GIVEN = BatchGroupModel.group_id.in_(select_from_number_parameter("ids"))
 _IN_BATCH = exists().where(BatchGroupModel.batch_id == _BATCH.c.id, _GIVEN)

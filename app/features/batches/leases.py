@@ -50,7 +50,7 @@ LASTS = timedelta(minutes=3)
 
 @dataclass(frozen=True)
 class BatchMember:
-    """Who works on a batch.
+    """A person who works on a batch.
 
     Attributes:
         name: As in the log.

@@ -53,7 +53,7 @@ class StallReason(StrEnum):
     """Why a batch has stalled."""
 
     IDLE = "idle"
-    """Nobody did anything in it for as long as the setting ``stalled_hours`` says."""
+    """The batch had no activity for ``stalled_hours`` (a setting)."""
     OVERDUE = "overdue"
     """Its due day is over, in UTC."""
 

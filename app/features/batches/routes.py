@@ -246,7 +246,7 @@ router = APIRouter(tags=["work"], route_class=Route)
 
 @dataclass(frozen=True)
 class BatchMemberResolver:
-    """Who asks, and what they may in a dataset; on a server without accounts there is no ``login``."""
+    """The person of the request and their permissions in a dataset; ``login`` is None on a server without accounts."""
 
     login: Login | None
 

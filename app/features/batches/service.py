@@ -99,7 +99,7 @@ class NewBatch:
 
 @dataclass(frozen=True)
 class Presence:
-    """Somebody who has a group open, and since when."""
+    """A person who has a group open, and since when."""
 
     group: int
     person: str

@@ -36,7 +36,7 @@ class BatchModel(Base):
 
 
 class BatchPersonModel(Base):
-    """Somebody a batch was given to; ``part`` is ``annotator`` or ``reviewer``, or both in two rows."""
+    """A person to whom a batch is assigned; ``part`` is ``annotator`` or ``reviewer``, or both in two rows."""
 
     __tablename__ = "batch_person"
     __table_args__ = (Index("batch_person_person", "person_id"),)
@@ -96,7 +96,7 @@ class BatchTrackModel(Base):
 
 
 class LeaseModel(Base):
-    """Somebody (a name as in the log) has a group of a batch open.
+    """A lease: a person (a name as in the log) has a group of a batch open.
 
     ``taken`` is since when, ``seen`` when their page last said so, ``until`` when it ends unless
     the page says so again.

@@ -55,7 +55,7 @@ class CommentModel(Base):
 
 
 class CommentMentionModel(Base):
-    """Somebody whom a comment mentions, and who saw its dataset when it was written."""
+    """A person whom a comment mentions, and who could see its dataset when it was written."""
 
     __tablename__ = "comment_mention"
     __table_args__ = (Index("comment_mention_person", "person_id"),)
@@ -256,7 +256,7 @@ def change_comment(session: Session, comment_id: int, text: str | None, time: st
 
 
 def set_mentions(session: Session, comment_id: int, people: Iterable[int]) -> None:
-    """Whom a comment mentions, by the ids of the people."""
+    """The ids of the people whom a comment mentions."""
     session.execute(delete(CommentMentionModel).where(CommentMentionModel.comment_id == comment_id))
     rows = [{"comment_id": comment_id, "person_id": person} for person in people]
     if rows:

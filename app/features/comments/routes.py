@@ -118,7 +118,7 @@ class ThreadList(ListDocument[ThreadDocument]):
 
 
 class MentionablePeople(Document):
-    """Who sees a group, and can be mentioned there; nobody where people do not log in."""
+    """The people who see a group and can be mentioned there; empty on a server without accounts."""
 
     names: list[str]
 
@@ -126,7 +126,7 @@ class MentionablePeople(Document):
 @router.get("/people", operation_id="listPeopleOfGroup", responses=responses(404))
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 def list_people_to_mention(group: Id, store: AppStore) -> MentionablePeople:
-    """Who can be mentioned in comments on the group: everybody who sees it."""
+    """The people who can be mentioned in comments on the group: all who see it."""
     return MentionablePeople(names=comments.list_mentionable_people(store, group))
 
 

@@ -57,9 +57,9 @@ class SetStationLines:
 
     lines: LineChanges
     proposed: tuple[str, ...] = ()
-    """Those of the markings whose points are as they were proposed."""
+    """The markings whose points are as they were proposed."""
     not_visible: tuple[str, ...] = ()
-    """Those of the markings without points that the picture does not show."""
+    """The markings without points that the picture does not show."""
 
     def apply(self, station: Station) -> Station:
         """The station with these markings."""
@@ -152,9 +152,9 @@ class SetLines:
     view: str
     lines: LineChanges
     proposed: tuple[str, ...] = ()
-    """Those of the markings whose points are as they were proposed."""
+    """The markings whose points are as they were proposed."""
     not_visible: tuple[str, ...] = ()
-    """Those of the markings without points that the picture does not show."""
+    """The markings without points that the picture does not show."""
 
     def apply(self, group: Group) -> Group:
         """The group with these markings in the view (and in others that share its station)."""

@@ -81,7 +81,7 @@ def edit_groups(
 
 
 def read_last_ball_actors(session: Session, groups: Sequence[int]) -> dict[int, dict[str, str]]:
-    """Who placed the ball of each view last, by id of the group and key of the view.
+    """The person who placed the ball of each view last, by id of the group and key of the view.
 
     A ball that somebody accepted from predictions is not placed by them, and one that undo or redo
     brings back is of whoever placed it.
@@ -93,7 +93,7 @@ def read_last_ball_actors(session: Session, groups: Sequence[int]) -> dict[int, 
 def read_ball_actors_after_step(
     session: Session, group_id: int, kind: str, step: int
 ) -> dict[str, str]:
-    """Who will have placed the ball of each view once a step is undone or done again.
+    """The person who placed the ball of each view, as it is after an undo or redo.
 
     Args:
         session: Any session.
@@ -108,7 +108,7 @@ def read_ball_actors_after_step(
 
 @dataclass
 class _BallHistory:
-    """Who placed the balls of a group's views, and before and after each edit that placed any."""
+    """The people who placed the balls of a group's views, now, and before and after each edit that placed any."""
 
     placed: dict[str, str] = field(default_factory=dict)
     around: dict[int, tuple[dict[str, str | None], dict[str, str | None]]] = field(

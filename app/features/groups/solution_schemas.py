@@ -376,7 +376,7 @@ class FixGuideDocument(Document):
 
 
 class DismissalDocument(Document):
-    """Who has checked a finding and found it fine."""
+    """The dismissal of a finding: by whom and when."""
 
     by: str = Field(validation_alias="actor")
     at: datetime

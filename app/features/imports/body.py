@@ -68,7 +68,7 @@ GONE = "this group is no longer in the imported files; it is kept until a person
 def filter_missing_groups_of_read_matches(
     session: Session, dataset_id: int, matches: Collection[str], missing: Collection[int]
 ) -> list[int]:
-    """Those of the missing groups whose match came all the same: they are truly gone.
+    """The missing groups whose match was imported: these are gone from the source.
 
     A source may bring a part of what it brought last, a match at a time.
 

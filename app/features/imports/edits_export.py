@@ -170,7 +170,7 @@ def _has_several_states(chain: RevisionChain) -> bool:
 
 
 def _edit_entries_to_json(logged: Iterable[LogEntry]) -> list[Json]:
-    """Who edited what and when; carried edits of a third installation too."""
+    """The edits with author and time, also those that came from a third installation."""
     entries: list[Json] = []
     for entry in logged:
         if entry.kind in EDIT_KINDS:

@@ -200,7 +200,7 @@ def _make_exported_station_history(
 def _filter_new_findings(
     session: Session, group_id: int, kept: list[KeptEditFinding]
 ) -> list[KeptEditFinding]:
-    """Those of the findings that are not there already."""
+    """The findings that the group does not have yet."""
     if not kept:
         return []
     known = set(list_group_import_findings(session, group_id))

@@ -63,7 +63,7 @@ WRONG_VERSION = "not as it was frozen"
 
 @dataclass
 class PeopleSnapshot:
-    """Who there is, and as what.
+    """The accounts and their roles.
 
     Attributes:
         accounts: Role on the server, and whether they are disabled, by name.

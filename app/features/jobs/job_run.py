@@ -193,17 +193,17 @@ class RunQueue:
 
     @property
     def all_runs(self) -> tuple[JobRun, ...]:
-        """Those that wait and those that run."""
+        """The jobs that wait and those that run."""
         return (*self.waiting, *self.running)
 
     @property
     def ready_runs(self) -> list[JobRun]:
-        """Those that wait, and for nothing of their own dataset that runs."""
+        """The waiting jobs whose dataset has no running job."""
         taken = {run.job.dataset_id for run in self.running} - {None}
         return [run for run in self.waiting if run.job.dataset_id not in taken]
 
     def list_independent_ready_runs(self, kinds: Collection[str]) -> list[JobRun]:
-        """Those of some kinds that are ready, and of whose dataset nothing was asked for before."""
+        """The ready jobs of some kinds that are the earliest waiting job of their dataset."""
         first: dict[int | None, int] = {}
         for run in self.waiting:
             first[run.job.dataset_id] = min(run.job.id, first.get(run.job.dataset_id, run.job.id))

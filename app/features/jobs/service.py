@@ -232,5 +232,5 @@ class Jobs(JobRunner):
             )
 
     def _list_actors_of_waiting_jobs(self, _session: Session) -> list[str]:
-        """Who asked for each job that waits."""
+        """The person who requested each waiting job."""
         return [run.job.actor for run in self._queue.waiting]

@@ -161,7 +161,7 @@ class AccessTokens:
         return self._token_from_row(made), text
 
     def find_login_of_token(self, text: str) -> Login:
-        """Who asks with a token, and what it is for.
+        """The owner of a token, and its scopes.
 
         Raises:
             NotLoggedInError: It is none, has expired or was ended, or its person is disabled.

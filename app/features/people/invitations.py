@@ -28,7 +28,7 @@ _COLUMNS = ("name", "role", "email")
 
 @dataclass(frozen=True)
 class InvitationRow:
-    """Somebody who shall be invited, as a list says it: nothing is checked yet.
+    """A person to invite, as given in a list: nothing is checked yet.
 
     Attributes:
         row: Which row of the list that is.

@@ -134,7 +134,7 @@ class PasswordLink:
 
 @dataclass(frozen=True)
 class LinkHolder:
-    """Whom a link is for; ``name`` is None for the first admin, who chooses one.
+    """The person a link is for; ``name`` is None for the first admin, who chooses one.
 
     Attributes:
         name: None: for the first admin, who chooses one.
@@ -165,7 +165,7 @@ def insert_password_link(
 
 
 def find_link_holder(store: Store, token: str) -> LinkHolder:
-    """Whom a link is for; it stays good.
+    """The person a link is for; the link stays valid.
 
     Raises:
         NotFoundError: It is not good.

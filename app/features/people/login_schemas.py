@@ -186,7 +186,7 @@ class SignOnCallback(BaseModel):
 
 
 class SignOnFinished(Document):
-    """Who is logged in now, and the page to show."""
+    """The person who is logged in, and the page to show."""
 
     session: SessionDocument
     to: str

@@ -88,7 +88,7 @@ class UsedToken:
 
 @dataclass(frozen=True)
 class Login:
-    """Who asks, by which session or token (``id`` is that one's), and with which rights."""
+    """The person of a request, the session or token (``id``) that it comes with, and its rights."""
 
     id: int
     person_id: int
@@ -286,7 +286,7 @@ class LoginSessions:
         return token
 
     def find(self, token: str, *, at_once: bool = False) -> Login | None:
-        """Who a token stands for; None where its session has ended.
+        """The person of a session token; None where the session has ended.
 
         Raises:
             BusyError: It had to be said ``at_once``, and cannot be without waiting.

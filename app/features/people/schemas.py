@@ -26,7 +26,7 @@ EXAMPLE: JsonDict = {
 
 
 class LoginCredentials(BaseModel):
-    """Who somebody says they are."""
+    """Name and password of a login."""
 
     model_config = ConfigDict(
         extra="forbid",
@@ -121,7 +121,7 @@ class LoginMethods(Document):
 
 
 class SessionDocument(Document):
-    """Who asks."""
+    """The person who sends the request."""
 
     team: bool = Field(description="People log in; else one person runs the server alone.")
     name: str | None = Field(description="Null: not logged in.")
@@ -169,7 +169,7 @@ class OpenSessionList(ListDocument[OpenSessionDocument]):
 
 
 class NewUser(BaseModel):
-    """Somebody who shall have an account."""
+    """A person for whom an account is to be made."""
 
     model_config = ConfigDict(
         extra="forbid", json_schema_extra={"examples": [{"name": "anna", "role": "reviewer"}]}
@@ -285,7 +285,7 @@ class MemberEdit(BaseModel):
 
 
 class MemberDocument(Document):
-    """Somebody with an account, and what they are in a dataset."""
+    """A person with an account, and their role in a dataset."""
 
     id: int
     name: str

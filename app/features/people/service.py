@@ -50,7 +50,7 @@ from app.soccer.actors import person_of_actor
 
 @dataclass(frozen=True)
 class Person:
-    """Somebody with an account.
+    """A person with an account.
 
     Attributes:
         joined: Whether they have chosen a password or use single sign-on.
@@ -227,13 +227,13 @@ def change_person(
 
 
 def get_person(store: Store, person_id: int) -> Person:
-    """Somebody by their id; raises NotFoundError when there is nobody."""
+    """The person with an id; raises NotFoundError where there is none."""
     with store.read() as session:
         return _read_person(session, person_id)
 
 
 def find_person(store: Store, name: str) -> Person:
-    """Somebody by their name; raises NotFoundError when there is nobody."""
+    """The person with a name; raises NotFoundError where there is none."""
     for person in list_people(store):
         if person.name == name.strip().lower():
             return person
@@ -274,7 +274,7 @@ def _person_from_row(
 
 @dataclass(frozen=True)
 class Member:
-    """Somebody and a dataset.
+    """A person and a dataset.
 
     Attributes:
         id: Of the person.

@@ -58,7 +58,7 @@ sign_on_router = APIRouter(tags=["sessions"], route_class=UnstoredResponseRoute)
 
 
 async def get_login(request: Request) -> Login:
-    """Who is logged in, on a route that the table lets nobody else reach.
+    """The person who is logged in, on a route that needs a login.
 
     Raises:
         NotLoggedInError: Nobody is.
@@ -95,7 +95,7 @@ def make_session_document(login: Login | None, store: Store) -> SessionDocument:
 @router.get("/session", operation_id="getSession", responses=responses(401, 429))
 @open_to_all
 def get_session(request: Request, services: AppServices) -> SessionDocument:
-    """Who asks; nobody, before they have logged in. With a token: whose it is, and what it may."""
+    """The person of the request, empty before the login. With a token: its owner and its scopes."""
     team: TeamLogin | None = request.app.state.team
     if team is None:
         every = ALLOWS[Role.ADMIN]
@@ -256,7 +256,7 @@ def end_session(session: Id, team: AppTeam, me: Me) -> None:
 @router.post("/links/look", operation_id="readLink", responses=responses(404, 409, 413, 415, 429))
 @open_to_all
 def look_at_link(asked: LinkToken, request: Request, store: AppStore, team: AppTeam) -> LinkHolder:
-    """Whom a link is for; 404 when it is not good any more."""
+    """The person a link is for; 404 where it is no longer valid."""
     team.count_login_attempt(request)
     return LinkHolder(**vars(links.find_link_holder(store, asked.token)))
 

@@ -292,7 +292,7 @@ class SignOn:
         return person_id
 
     def _make_person(self, session: Session, claims: Mapping[str, Any]) -> int:
-        """Somebody new, where the operator lets in whom nobody here knows."""
+        """Make an account for an unknown person, where the operator allows that."""
         if self.rules.new_role is None:
             raise NotLoggedInError(
                 self._unknown_account_sentence(), hint=self._unknown_account_hint()

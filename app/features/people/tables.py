@@ -12,7 +12,7 @@ from app.db.session import Base
 
 
 class PersonModel(Base):
-    """Somebody with an account; ``password`` is an argon2 hash, NULL until they have chosen one."""
+    """A person with an account; ``password`` is an argon2 hash, NULL until they have chosen one."""
 
     __tablename__ = "person"
 

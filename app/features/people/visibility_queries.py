@@ -28,7 +28,7 @@ _ALIASES = select(ActorAliasModel.actor, ActorAliasModel.at, PersonModel.name.la
 
 @dataclass(frozen=True)
 class RestrictedReader:
-    """Somebody who asks, and is no admin.
+    """The person of a request who is not an admin.
 
     Attributes:
         person: Their name.

@@ -289,7 +289,7 @@ def _validate_policy_name(name: object) -> str:
 
 
 def _require_unchanged_shipped_policy(policy: Policy) -> None:
-    """Whoever reads the name of a shipped policy in an export must be able to rely on it."""
+    """Refuse the name of a shipped policy for other values: readers of exports rely on it."""
     if policy.name in POLICIES and not is_builtin_policy(policy):
         raise InputError(
             f'"{policy.name}" is the name of a policy with other thresholds',

@@ -21,7 +21,7 @@ from app.features.solutions.queries import find_newest_solution_id
 MANY = 200
 """So many groups of one dataset at once are told as one change of the dataset."""
 FAR = 5000
-"""Who was away for more entries than this is told to read everything anew."""
+"""A client that missed more entries than this has to read everything again."""
 COMMENT = "comment"
 """Kind of a change of what people say to each other about a group; the group is what it was."""
 EVERYTHING = "everything"

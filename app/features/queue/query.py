@@ -295,7 +295,7 @@ def _independent_annotations_condition(term: _QueryTerm, value: str) -> Conditio
 
 
 def _mentions_condition(_term: _QueryTerm, value: str) -> Condition:
-    """Whom an open thread mentions."""
+    """The people whom an open thread mentions."""
     if value in ("any", "none"):
         return _any_or_none_condition(value, conditions.mentions_person())
     return conditions.mentions_person(value.lower())

@@ -261,7 +261,7 @@ def _make_group_columns(head: Any, views: Sequence[Any]) -> dict[str, Any]:
 
 
 def filter_edited_groups(session: Session, ids: Sequence[int]) -> set[int]:
-    """Those of the groups that are not what their dataset brought.
+    """The groups that differ from what was imported.
 
     A shared station is not the group's: what is drawn there counts for no group.
     """

@@ -108,6 +108,6 @@ def delete_saved_view(view: Id, store: AppStore) -> SavedView:
 @may(Action.READ, dataset=OwnedKind.DATASET)
 @paged()
 def list_reviewers(dataset: DatasetPath, store: AppStore) -> ReviewerList:
-    """Who has judged how many groups."""
+    """The number of groups that each person judged."""
     found = reviewers.list_reviewers(store, dataset_id(store, dataset))
     return ReviewerList(items=found)

@@ -325,7 +325,7 @@ def read_summary(text: str) -> SolutionSummary:
 
 
 def list_undetermined_calibrations(session: Session, keys: Collection[str]) -> set[str]:
-    """Those of the keys whose calibration has no camera, or one that its lines leave open."""
+    """The keys whose calibration has no camera, or one that its lines do not determine."""
     found = {key: _SEEN[key] for key in keys if key in _SEEN}
     unseen = sorted(set(keys) - set(found))
     if len(_SEEN) + len(unseen) > MOST_SEEN:
@@ -344,7 +344,7 @@ def _is_undetermined(body: bytes) -> bool:
 
 
 def filter_stored_calibration_keys(session: Session, keys: Iterable[str]) -> set[str]:
-    """Those of the keys under which a calibration is kept."""
+    """The keys under which a calibration is stored."""
     return set(session.scalars(_KEPT, {"keys": list(keys)}))
 
 

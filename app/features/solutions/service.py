@@ -109,7 +109,7 @@ def list_calibration_keys(groups: Iterable[Group], policy: Policy) -> set[str]:
 def read_known_calibrations(
     session: Session, groups: Iterable[Group], policy: Policy
 ) -> dict[str, Calibration]:
-    """Those of the calibrations that groups need which are kept already."""
+    """The stored ones among the calibrations that groups need."""
     return read_calibrations(session, list_calibration_keys(groups, policy))
 
 

@@ -202,7 +202,7 @@ def give_verdicts(
 
 
 def _filter_remaining_rows(rows: Sequence[Any], begun: Mapping[str, Any]) -> list[Any]:
-    """Those of some groups that a run which was stopped had left.
+    """The groups that an interrupted run left over.
 
     It remembers the numbers between which they lie, so that whatever was imported since is not
     among them; one of an earlier version remembers each of them.

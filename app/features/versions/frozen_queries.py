@@ -179,7 +179,7 @@ def find_frame_files(group: Group, facts: Mapping[str, Mapping[str, int]]) -> Fr
 
 
 def filter_stored_frozen_keys(session: Session, dataset_id: int, keys: Iterable[str]) -> set[str]:
-    """Those of the keys that are there already."""
+    """The keys that are stored already."""
     statement = select(FrozenModel.key).where(
         FrozenModel.dataset_id == dataset_id, FrozenModel.key.in_(list(keys))
     )

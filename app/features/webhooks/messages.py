@@ -33,7 +33,7 @@ class MessageKind(StrEnum):
     JUDGED = "group.judged"
     """Groups were accepted, rejected, deferred, or are not judged any more."""
     COMMENTED = "group.commented"
-    """Somebody said something about a group, or a thread was settled; the message has no text."""
+    """A comment was written on a group, or a thread was resolved; the message does not contain the text."""
     DATASET = "dataset.changed"
     """What concerns a whole dataset: an import, thresholds, static cameras, pitches, positions."""
     GIVEN_OUT = webhook_outbox.GIVEN_OUT
@@ -43,16 +43,16 @@ class MessageKind(StrEnum):
     DONE = webhook_outbox.DONE
     """The work on the last group of a batch is over."""
     STALLED = webhook_outbox.STALLED
-    """Nobody does anything in a batch any more, or its due day is over."""
+    """Work on a batch has stalled, or its due day is over."""
     DISPUTED = webhook_outbox.DISPUTED
     """Annotations of a group do not agree: somebody has to decide."""
     HANDED_BACK = webhook_outbox.HANDED_BACK
-    """Somebody has work back that they had handed in; the message does not say why."""
+    """Submitted work was returned to its annotator; the message does not contain the reason."""
     FROZEN = "version.frozen"
     JOB_DONE = "job.done"
     JOB_FAILED = "job.failed"
     PING = "ping"
-    """Somebody tries whether messages arrive; every webhook gets it."""
+    """A test message; every webhook gets it."""
 
 
 CHOSEN = tuple(kind for kind in MessageKind if kind is not MessageKind.PING)

@@ -82,7 +82,7 @@ def _webhook_with_secret(made: tuple[Webhook, str]) -> WebhookWithSecret:
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @paged()
 def list_webhooks(dataset: DatasetPath, store: AppStore) -> WebhookList:
-    """Who is told what happens in a dataset."""
+    """The webhooks of a dataset."""
     items = webhooks.list_webhooks(store, dataset)
     return WebhookList(items=items, allowed=store.settings.webhooks, kinds=list(CHOSEN))
 
