@@ -36,7 +36,7 @@ of the diagonal."""
 def find_calibration_findings(
     calibration: Calibration, size: ImageSize, view: str | None = None
 ) -> Iterator[Finding]:
-    """What the calibration of one view (or line file) has to say.
+    """The findings about the calibration of one view (or line file).
 
     Args:
         calibration: The calibration, measured against its lines.
@@ -203,7 +203,7 @@ def _find_picture_distortions(
 def find_pitch_findings_of_lone_frame(
     alone: LoneFrameUncertainty | None, pitch: Pitch
 ) -> Iterator[Finding]:
-    """What the lines of a frame alone say of its pitch.
+    """The findings about the pitch from the lines of one frame alone.
 
     Args:
         alone: What nobody else says of it; None where it is said.

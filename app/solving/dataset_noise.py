@@ -325,7 +325,7 @@ class _SourceVariances:
     of: FloatArray
 
     def view_variances(self, logs: FloatArray) -> FloatArray:
-        """What the views add under some factors, shape (C,)."""
+        """The variance that the views add under some factors, shape (C,)."""
         own: FloatArray = self.added * np.exp(2 * self.of @ logs)
         return own
 
@@ -335,7 +335,7 @@ class _SourceVariances:
         return variance
 
     def variances_by_source(self, own: FloatArray) -> FloatArray:
-        """What the views of each source add to each miss, shape (M, S)."""
+        """The variance that the views of each source add to each miss, shape (M, S)."""
         total = np.zeros((len(self.known), self.of.shape[1]))
         np.add.at(total, self.row, own[:, None] * self.of)
         return total

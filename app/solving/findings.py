@@ -166,7 +166,7 @@ def _find_view_disagreement(
 def make_view_disagrees_finding(
     view: str, best: TriangulatedPair, letters: Mapping[str, str], tau_px: float
 ) -> Finding:
-    """What is said of a view that misses the others' ball in its closest pair.
+    """The finding about a view that misses the others' ball in its closest pair.
 
     Rays may also meet behind a camera, and the pixels there be as near as is allowed.
 

@@ -117,7 +117,7 @@ def project_markings_like_evaluator(
 def classify_markings(
     measured: dict[str, ProjectedMarking], lines: Lines, gamma_px: float
 ) -> dict[str, str]:
-    """What each marking counts as at a threshold: ``tp``, ``fp`` or ``fn``."""
+    """The class of each marking at a threshold: ``tp``, ``fp`` or ``fn``."""
     result = {}
     for marking in MARKINGS:
         annotated = bool(lines.get(marking))

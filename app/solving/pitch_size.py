@@ -55,7 +55,7 @@ def find_frames_with_enough_measurements(seen: Iterable[Observations]) -> list[i
 
 
 def eliminate_camera(gradient: FloatArray, information: FloatArray, variance: float) -> Share:
-    """What a frame says of the shared numbers once its camera is eliminated.
+    """The information of a frame on the shared numbers, with its camera eliminated.
 
     Args:
         gradient: Of the camera's P parameters and, behind them, of the numbers, shape (P + K,).
@@ -280,7 +280,7 @@ class _FittedFrame:
         )
 
     def information_on_size(self) -> Share:
-        """What the frame says of length and width, whatever its camera."""
+        """The information of the frame on length and width, for any camera."""
         gradient, information = self._normal_equations()
         variance = self.problem.click_variance(self.fit.parameters, self.observations)
         share = eliminate_camera(gradient, information, variance)

@@ -85,7 +85,7 @@ def list_open_cases(store: Store, dataset: str | int) -> list[OpenCase]:
 
 
 def read_case(store: Store, group_id: int, *, actor: str) -> AdjudicationCase:
-    """What is to be decided about a group.
+    """The adjudication case of a group: its annotations and their differences.
 
     Raises:
         NotFoundError: Nothing of it waits for a decision.

@@ -112,7 +112,7 @@ def list_agreements(
 
 
 def list_group_agreements(session: Session, group_id: int) -> Sequence[AgreementRow]:
-    """What a group came to in each batch, what waits for a decision first."""
+    """The agreement rows of a group, one for each batch, open ones first."""
     order = (AgreementModel.state != OPEN, AgreementModel.batch_id)
     mine = AgreementModel.group_id == group_id
     return session.rows(AgreementRow, _ROWS.where(mine).order_by(*order))

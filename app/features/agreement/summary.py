@@ -99,7 +99,7 @@ class _ComparedGroup:
 
     @property
     def verdicts(self) -> dict[str, str | None]:
-        """What each person judged, in the order of their names."""
+        """The verdict of each person, in the order of their names."""
         verdicts: dict[str, str | None] = {}
         for pair in self.pairs:
             verdicts |= dict(zip(pair.people, pair.verdicts, strict=True))

@@ -64,7 +64,7 @@ class BatchMember:
     alone: bool = False
 
     def roles_in_batch(self, batch: Batch) -> set[BatchRole]:
-        """What they do in a batch."""
+        """The roles of the person in a batch."""
         parts = set()
         if self.name in batch.annotators and self.may_annotate:
             parts.add(BatchRole.ANNOTATOR)

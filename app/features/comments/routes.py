@@ -134,7 +134,7 @@ def list_people_to_mention(group: Id, store: AppStore) -> MentionablePeople:
 @may(Action.READ, group=OwnedKind.GROUP)
 @paged()
 def list_threads(group: Id, store: AppStore, actor: Actor) -> ThreadList:
-    """What people say to each other about the group, the oldest thread first."""
+    """The comment threads of the group, oldest first."""
     found = comments.list_threads(store, group)
     return ThreadList(items=[ThreadDocument.of(thread, actor) for thread in found])
 

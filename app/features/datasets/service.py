@@ -55,7 +55,7 @@ State = TypeVar("State", bound=HasMatch)
 
 
 def filter_by_match(states: Iterable[State], match: str | None) -> list[State]:
-    """What is known of one match, or of all where ``match`` is None."""
+    """The states of one match, or of all where ``match`` is None."""
     return [state for state in states if match in (None, state.match)]
 
 
@@ -352,7 +352,7 @@ class DatasetContents:
 
 
 def read_contents(store: Store, dataset: str | int) -> DatasetContents:
-    """What deleting a dataset would take away.
+    """The counts of everything that deleting a dataset would remove.
 
     Raises:
         NotFoundError: There is no such dataset.

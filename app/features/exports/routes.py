@@ -296,7 +296,7 @@ def list_exports(
 @router.get("/exports/{export}", operation_id="getExport", responses=responses(404))
 @may(Action.READ, export=OwnedKind.EXPORT)
 def get_export(export: ExportId, services: AppServices) -> ExportDocument:
-    """What was asked for, how far it is, and what came of it."""
+    """An export: its request, progress and result."""
     return _export_document(services, export)
 
 

@@ -483,7 +483,7 @@ class _ExportRun:
         return write_format(root, self._iterate_records(), wanted, put)
 
     def manifest(self, counts: Mapping[str, int]) -> Manifest:
-        """What the manifest says of this export."""
+        """The manifest of this export."""
         source = self._source
         terms = " ".join(sorted(self._licences)) or UNKNOWN_LICENCE
         return Manifest(

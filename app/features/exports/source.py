@@ -97,10 +97,10 @@ class ExportSource(Protocol):
         """The policy that judges it."""
 
     def settings(self) -> dict[str, Any]:
-        """What decided what is in it, for the manifest."""
+        """The settings that determined the content, for the manifest."""
 
     def stamp(self) -> dict[str, Json]:
-        """What else the manifest says of it."""
+        """Further values of the source for the manifest."""
 
     def items(self) -> Iterator[Item]:
         """Its groups, streamed."""

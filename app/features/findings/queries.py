@@ -74,7 +74,7 @@ class DismissalModel(Base):
 
 
 def findings_from_rows(rows: Iterable[Any], inputs_hash: str) -> list[Finding]:
-    """What was noticed about a group as it is now.
+    """The stored findings of a group in its present state.
 
     Args:
         rows: Of the group, as ``read_import_findings_and_dismissals`` has them.
@@ -134,7 +134,7 @@ def replace_group_import_findings(
 
 
 def find_station_finding(session: Session, station_id: int) -> str | None:
-    """What is noticed about a static camera."""
+    """The sentence of the import finding of a static camera; None where there is none."""
     model = ImportFindingModel
     return session.scalar(select(model.sentence).where(model.station_id == station_id))
 
@@ -322,7 +322,7 @@ MERGED_COLUMNS = tuple(
 def read_dismissals_to_export(
     session: Session, ids: Iterable[int]
 ) -> dict[int, list[dict[str, Any]]]:
-    """What is carried of the dismissals of groups, by group, oldest first."""
+    """The dismissals of groups to export, by group, oldest first."""
     columns = [_TABLE.c[name] for name in MERGED_COLUMNS]
     statement = select(_TABLE.c.group_id, *columns).where(_TABLE.c.group_id.in_(list(ids)))
     found: dict[int, list[dict[str, Any]]] = {}

@@ -109,7 +109,7 @@ class _GroupEditPlan:
 def plan_edits(
     store: Store, dataset_id: int, items: Sequence[ViewEdits], *, actor: str
 ) -> BulkEditReport:
-    """What ``edit_views`` would do now; nothing is solved or saved.
+    """A report of what ``edit_views`` would change; nothing is solved or saved.
 
     Raises:
         TooManyPointsError: The items bring more points than a request may.

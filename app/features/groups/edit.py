@@ -339,7 +339,7 @@ class CompositeEdit:
         return group
 
     def inverse(self, group: Group) -> CompositeEdit:
-        """What takes the last one back first."""
+        """The edits that undo these, the last one first."""
         back: list[Edit] = []
         for edit in self.edits:
             back.insert(0, edit.inverse(group))

@@ -230,7 +230,7 @@ class ProposalTask:
         return self.make_stored_proposal(ViewProposal("nothing", sentence, {}), "")
 
     def make_stored_proposal(self, found: ViewProposal, frame: str) -> Proposal:
-        """What is kept of an answer for the picture with this digest."""
+        """The proposal to store for the picture with this digest."""
         return Proposal(
             view_id=self.view_id,
             **vars(found),

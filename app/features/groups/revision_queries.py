@@ -433,10 +433,10 @@ class SolvedEtagRow(NamedTuple):
 
 
 def find_etag_row(session: Session, group_id: int) -> EtagRow | None:
-    """What names the state of a group; None where there is no such group."""
+    """The row from which the ETag of a group is made; None where there is no such group."""
     return session.row(EtagRow, _HEAD, {"group": group_id})
 
 
 def read_etag_rows(session: Session, group_ids: Sequence[int]) -> Sequence[SolvedEtagRow]:
-    """What names the states of groups, with their policies and solutions."""
+    """The rows from which the ETags of groups are made, with their policies and solutions."""
     return session.rows(SolvedEtagRow, _HEADS, {"ids": list(group_ids)})

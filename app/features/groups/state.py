@@ -237,12 +237,12 @@ class GroupWithoutSolution:
 
     @property
     def noticed_findings(self) -> tuple[Finding, ...]:
-        """What was noticed about the group as it is."""
+        """The stored findings of the group in its present state."""
         return tuple(findings_from_rows(self.said, self.stored.inputs_hash))
 
     @property
     def content_part_of_etag(self) -> str:
-        """What people said: the part of the ETag that a change builds on."""
+        """The part of the ETag that stands for annotations and verdict, on which a change builds."""
         newest = self.newest_verdict
         verdict_id = 0 if newest is None else newest.id
         stored = self.stored

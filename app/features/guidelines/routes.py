@@ -40,7 +40,7 @@ def get_guidelines(
         int | None, Query(ge=1, le=2**31, description="Of a version; else the newest.")
     ] = None,
 ) -> guidelines.Guidelines:
-    """What annotators are told, and who wrote which version."""
+    """The guidelines of the dataset, with the author of each version."""
     return guidelines.read_guidelines(store, dataset, number)
 
 

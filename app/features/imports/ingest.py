@@ -99,7 +99,7 @@ class IngestReport:
     replaced: Counter[str] = field(default_factory=Counter)
 
     def describe_replaced_parts(self, source: str) -> list[str]:
-        """What took the place of parts of earlier imports, a sentence each."""
+        """A sentence for each part of earlier imports that was replaced."""
         sentences = []
         if self.dropped_views:
             views = plural(sum(self.dropped_views.values()), "view")

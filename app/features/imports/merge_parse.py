@@ -45,7 +45,7 @@ _MISSHAPEN = (ArithmeticError, AttributeError, LookupError, ReviewError, TypeErr
 
 @dataclass(frozen=True)
 class MergeHeader:
-    """What the file says of itself."""
+    """The header of the file."""
 
     dataset: str
     policy: Policy
@@ -76,7 +76,7 @@ class MergeGroup:
 
 
 def read_merge_header(tree: FileTree) -> MergeHeader:
-    """What the file says of itself.
+    """The header of the file.
 
     Raises:
         DatasetFormatError: It is no export of Touchline, or one of a newer kind.

@@ -77,7 +77,7 @@ def list_shared_stations(
 def list_verdicts_of_groups(
     session: Session, ids: Iterable[int]
 ) -> dict[int, list[dict[str, Any]]]:
-    """What is carried of the verdicts of groups, by group, oldest first."""
+    """The verdicts of groups to export, by group, oldest first."""
     columns = [getattr(VerdictModel, name) for name in VERDICT]
     statement = (
         select(VerdictModel.group_id, *columns)

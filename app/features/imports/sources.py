@@ -176,7 +176,7 @@ class ImportSource:
 
     @property
     def label(self) -> str:
-        """What the log calls it."""
+        """The name of the source in the log."""
         return self.name or str(self.path)
 
     def shown(self, text: str) -> str:

@@ -393,7 +393,7 @@ def delete_gold(session: Session, group_id: int) -> None:
 
 
 def read_gold_start(session: Session, group_id: int) -> str:
-    """What annotators of a gold group begin with."""
+    """The start that annotators of a gold group get."""
     statement = select(GoldModel.start).where(GoldModel.group_id == group_id)
     return session.scalar(statement) or IMPORTED
 
@@ -418,7 +418,7 @@ def find_gold_head(session: Session, group_id: int) -> GoldHead | None:
 
 
 def read_gold_truth(session: Session, group_id: int) -> Json | None:
-    """What is true of a gold group."""
+    """The truth of a gold group as JSON; None where it has none."""
     packed = session.scalar(select(GoldModel.truth).where(GoldModel.group_id == group_id))
     return None if packed is None else decompress_json(packed)
 

@@ -282,7 +282,7 @@ _FORMATS = (".jpg", ".png", ".webp")
 
 
 def examine_home_without_database(settings: Settings) -> list[CheckResult]:
-    """What can be said of a home without its database."""
+    """The checks of a home that need no database."""
     examined = (
         _check_settings,
         _check_permissions,

@@ -90,13 +90,13 @@ def _estimate_pitches_of_dataset(
 ) -> DatasetPitches:
     from app.features.pitches.service import (
         change_pitches,
-        choose_requested_sizes,
         estimate_pitches,
+        pitch_size_by_match,
     )
 
     with open_store_to_solve("Estimating", workers) as (store, executor, progress):
         found = estimate_pitches(store, dataset, executor, progress)
-        wanted = choose_requested_sizes(found, match, accept=accept, size=size)
+        wanted = pitch_size_by_match(found, match, accept=accept, size=size)
         if not wanted:
             return found
         with store.write() as session:

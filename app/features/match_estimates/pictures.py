@@ -61,7 +61,7 @@ class MatchPictureGeometryState:
 
     @property
     def sentence(self) -> str:
-        """What people read of it."""
+        """The sentence for people about this state."""
         if self.estimate is None:
             return self.problem or ""
         found, sigma = self.estimate.picture, self.estimate.picture.sigma
@@ -82,7 +82,7 @@ class _PictureGeometryTask:
 
 
 def read_picture_geometries(store: Store, dataset: str | int) -> list[MatchPictureGeometry]:
-    """What main cameras' pictures of a dataset's matches are taken to be.
+    """The picture geometry in use for the main cameras, by match of a dataset.
 
     Raises:
         NotFoundError: There is no such dataset.

@@ -108,7 +108,7 @@ class _PositionTask:
 
 
 def get_main_camera_positions(store: Store, dataset: str | int) -> DatasetPositions:
-    """What the matches of a dataset share.
+    """The main camera positions that the matches of a dataset share.
 
     Raises:
         NotFoundError: There is no such dataset.

@@ -240,7 +240,7 @@ def rig_proposal_to_json(proposed: ProposedRig) -> dict[str, Any]:
 
 
 def describe_anchor(proposal: RigProposal) -> str:
-    """What holds the adjusted cameras in their place."""
+    """A sentence that names what fixes the position of the adjusted cameras."""
     weak = "the cameras in use, as far as 10 px in the picture"
     if proposal.line_points:
         return f"held in place by {proposal.line_points} points of field lines and by {weak}"

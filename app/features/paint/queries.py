@@ -133,7 +133,7 @@ class MatchPaintCounts:
 
 
 def count_paint_by_match(session: Session, dataset_id: int) -> list[MatchPaintCounts]:
-    """What was read of the pictures of each match of a dataset, by name."""
+    """The counts of paint readings of each match of a dataset, by name."""
     group = GroupModel
     statement = (
         select(

@@ -352,6 +352,6 @@ def forget_dataset_proposals(dataset: DatasetPath, services: AppServices) -> int
 @may(Action.READ, group=OwnedKind.GROUP)
 @paged()
 def group_proposals(group: Id, store: AppStore) -> GroupProposals:
-    """What was proposed for the views of a group, with its lines and scores."""
+    """The proposed cameras of the views of a group, with lines and scores."""
     found = get_group_proposals(store, group)
     return GroupProposals(items=[GroupViewProposal.of_view(*item) for item in found])

@@ -103,7 +103,7 @@ class DatasetPaint:
 
 
 def summarize_paint_readings(store: Store, dataset: str | int) -> DatasetPaint:
-    """What was read of the pictures of a dataset's matches.
+    """The counts of paint readings of a dataset, by match.
 
     Raises:
         NotFoundError: There is no such dataset.

@@ -210,7 +210,7 @@ class StoredPendingActions:
 def make_pending_action_store(
     store: Store, clock: Clock, lasts: timedelta, kind: str
 ) -> PendingActionStore:
-    """What waits, where every process finds it that may be asked for it."""
+    """The store of pending actions that every web process can read."""
     if store.sharing.is_shared:
         return StoredPendingActions(store, clock, lasts, kind)
     return InMemoryPendingActions(clock, lasts)

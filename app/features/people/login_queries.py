@@ -272,7 +272,7 @@ def delete_identity(session: Session, person_id: int) -> str | None:
 
 
 def read_identity_labels(session: Session) -> dict[int, str]:
-    """What the accounts of people are known by, by id of the person."""
+    """The labels of linked accounts, by id of the person."""
     statement = select(IdentityModel.person_id, IdentityModel.shown)
     return {row.person_id: row.shown for row in session.execute(statement)}
 

@@ -116,7 +116,7 @@ class Login:
 
     @property
     def role(self) -> Role:
-        """What they are in every dataset in which they are nothing else."""
+        """The role in every dataset without a role of its own."""
         return self.roles.everywhere
 
     @property

@@ -75,7 +75,7 @@ class Ownership:
 
 
 def find_role_by_ownership(found: Ownership, roles: DatasetRoles, name: str) -> Role:
-    """What somebody is where something belongs; ``none``: they do not see it.
+    """The role of a person in the dataset of an object; ``none``: they do not see it.
 
     Args:
         found: Where it belongs.

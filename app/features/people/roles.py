@@ -172,7 +172,7 @@ class DatasetRoles:
         return Visibility(all_but, frozenset(named), "")
 
     def visibility(self, name: str) -> Visibility:
-        """What somebody of that name sees."""
+        """The visibility of the person with that name."""
         if self.is_admin:
             return EVERYTHING
         all_but = self.everywhere is not Role.NONE

@@ -203,7 +203,7 @@ def make_recovery_codes() -> list[str]:
 
 
 def hash_recovery_codes(codes: list[str]) -> list[str]:
-    """What is kept of recovery codes."""
+    """The hashes of recovery codes, as stored."""
     return [hash_token(normalize_code(one)) for one in codes]
 
 

@@ -119,7 +119,7 @@ def parse_origin(address: str) -> str:
 
 
 def read_rules(settings: Settings) -> SignOnRules | None:
-    """What the settings say; None where there is no single sign-on.
+    """The rules of single sign-on from the settings; None where there is none.
 
     Raises:
         InputError: They say it by half, or contradict themselves.

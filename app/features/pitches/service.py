@@ -203,10 +203,10 @@ def change_pitches(
     return changed
 
 
-def choose_requested_sizes(
+def pitch_size_by_match(
     found: DatasetPitches, match: str | None, *, accept: bool = False, size: str | None = None
 ) -> dict[str, Pitch]:
-    """What somebody wants the pitches of matches to be, by match.
+    """The pitch size to set, by match.
 
     Args:
         found: As they are.

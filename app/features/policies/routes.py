@@ -60,7 +60,7 @@ def list_policies() -> PolicyCatalogue:
 )
 @may(Action.READ, dataset=OwnedKind.DATASET)
 def get_policy(dataset: DatasetPath, store: AppStore, response: Response) -> PolicyStateDocument:
-    """What judges the dataset, and what judged it before."""
+    """The policy of the dataset, and its earlier versions."""
     policy = PolicyStateDocument.of(read_policy(store, dataset))
     response.headers.update(_make_etag_headers(policy))
     return policy

@@ -244,7 +244,7 @@ def find_lesson_kind(truth: SceneTruth) -> str:
 
 
 def judge_lesson(truth: SceneTruth, group: Group, verdict: VerdictState) -> Feedback:
-    """What to say about a practice group as it stands.
+    """The feedback on a practice group in its present state.
 
     Args:
         truth: Of the group, with its planted faults.
@@ -320,12 +320,12 @@ class _LessonTexts:
 
     @property
     def corrected_fault_sentence(self) -> str:
-        """What was wrong, and that it no longer is."""
+        """The sentence about a planted fault that was corrected."""
         return f"the fault is fixed. {self.fault_sentence}"
 
     @property
     def fault_sentence(self) -> str:
-        """What was planted."""
+        """The sentence about the planted fault."""
         return self._words.fault.format(**self._values)
 
     def make_feedback(self, state: str, remark: str) -> Feedback:

@@ -109,7 +109,7 @@ class AcceptReport:
 
 
 def plan_accept(store: Store, dataset: str | int, request: AcceptRequest) -> AcceptPlan:
-    """What ``accept_predicted_balls`` would do; saves nothing.
+    """The plan of ``accept_predicted_balls``; saves nothing.
 
     Raises:
         NotFoundError: There is no such dataset or set, or a view has no prediction.
@@ -365,7 +365,7 @@ class GroupPredictions:
 
 
 def read_group_predictions(store: Store, group_id: int) -> GroupPredictions:
-    """What was predicted for a group, and what was accepted of it.
+    """The predictions for a group, with those that were accepted.
 
     Raises:
         NotFoundError: There is no such group.

@@ -202,7 +202,7 @@ def list_frames(
 def compare_runs(
     store: Store, first_id: int, second_id: int, field: str = "error_m"
 ) -> RunComparison:
-    """What changed from one run to another of the same dataset.
+    """The comparison of two runs on the same dataset.
 
     Raises:
         NotFoundError: A run does not exist.
@@ -338,7 +338,7 @@ def _read_frames(store: Store, evaluation_id: int) -> Iterator[FrameResult]:
 def evaluate_stored_tracks(
     session: Session, dataset: DatasetHead, version: Version | None, predictions: PredictionSet
 ) -> tuple[Evaluation, dict[str, Json]]:
-    """What came of it, and what pins the truth.
+    """The evaluation of stored tracks, and the pins of its truth.
 
     Args:
         session: Any session.

@@ -129,12 +129,12 @@ def _run_accept(
 
 
 def make_evaluation_result(found: StoredEvaluation) -> dict[str, Any]:
-    """What the job of an evaluation leaves."""
+    """The result of an evaluation job."""
     return {"evaluation": found.id, "name": found.name, "counts": found.counts}
 
 
 def make_accept_result(report: AcceptReport) -> dict[str, Any]:
-    """What the job of an acceptance leaves."""
+    """The result of an acceptance job."""
     return {"changed": report.views, "groups": report.groups, "refused": dict(report.refused)}
 
 

@@ -174,7 +174,7 @@ def delete_predictions(predictions: Id, store: AppStore, actor: Actor) -> None:
 @may(Action.READ, view=OwnedKind.VIEW)
 @paged()
 def get_view_predictions(view: Id, store: AppStore) -> ViewPredictions:
-    """What was predicted for a view."""
+    """The predictions for a view."""
     find_view_location(store, view)
     found = review.read_predictions_of_view(store, view)
     return ViewPredictions(

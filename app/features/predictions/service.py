@@ -234,7 +234,7 @@ def delete_predictions(store: Store, set_id: int, *, actor: str) -> None:
 def read_predictions_of_view(
     store: Store, view_id: int
 ) -> list[tuple[PredictionSet, list[PredictedBox]]]:
-    """What was predicted for a view, by set, the newest set first."""
+    """The predicted boxes of a view, by set, the newest set first."""
     with store.read() as session:
         boxes = read_view_boxes(session, view_id)
         sets = read_prediction_sets(session, {box.set_id for box in boxes})

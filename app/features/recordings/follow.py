@@ -61,7 +61,7 @@ class BallFollower:
     def follow(
         self, recording: Recording, click: BallClick, bounds: tuple[int, int], hints: FollowHints
     ) -> BallRun | None:
-        """What a click is followed to; waits for the process.
+        """The ball run from a click, None where there is none; waits for the process.
 
         Args:
             recording: Of which recording.

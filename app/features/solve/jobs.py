@@ -86,7 +86,7 @@ def solve_fully(
 
 
 def describe_pending_work(store: Store, dataset: str | int) -> str | None:
-    """What ``solve_fully`` would do now, as a sentence; None: nothing."""
+    """A sentence about what ``solve_fully`` would do now; None: nothing."""
     groups, matches = (
         len(list_stale_groups(store, dataset)),
         len(list_matches_to_estimate(store, dataset)),

@@ -226,7 +226,7 @@ def _restore_frozen_stretch(
 
 
 def parse_frozen_track(key: str, value: Mapping[str, Any]) -> StoredStretchTrack:
-    """What a frozen version has of a stretch.
+    """The track of a stretch in a frozen version.
 
     Args:
         key: Of the stretch, as it was frozen.

@@ -113,7 +113,7 @@ def make_track_notices(
     groups: Mapping[int, GroupForTracking],
     track: tuple[BallTrack, TrackInputs] | None,
 ) -> TrackNotices:
-    """What one track says of its groups.
+    """The findings of one track about its groups.
 
     Args:
         session: Any session.

@@ -117,7 +117,7 @@ class FollowedViews:
 def plan_ball_following(
     store: Store, view_id: int, at: ImagePoint | None = None, each_way: int = EACH_WAY
 ) -> FollowTask:
-    """What has to be known to follow the ball of a view.
+    """The task of following the ball of a view, with all its inputs.
 
     Args:
         store: The database.

@@ -124,7 +124,7 @@ def find_track_row(session: Session, track_id: int) -> Any | None:
 
 
 def read_track_bodies(session: Session, track_ids: Collection[int]) -> dict[int, TrackBody]:
-    """What is large of tracks, by id."""
+    """The large columns of tracks, by id."""
     model = TrackModel
     statement = select(model.id, model.inputs, model.body, model.patches).where(
         model.id.in_(list(track_ids))

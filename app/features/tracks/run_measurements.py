@@ -80,7 +80,7 @@ class AcceptedRunObservation:
 
 
 def format_linked_view_name(recording: str, link: int) -> str:
-    """What the view of a linked replay is called in a stretch."""
+    """The name of the view of a linked replay in a stretch."""
     return f"{recording} link {link}"
 
 

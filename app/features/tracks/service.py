@@ -251,7 +251,7 @@ def make_track_source(
     policy: Policy,
     frozen: Mapping[str, Json] | None = None,
 ) -> TrackSource:
-    """What makes the tracks of an export.
+    """The source of the tracks of an export.
 
     Args:
         session: Any session.

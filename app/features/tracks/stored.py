@@ -26,7 +26,7 @@ UNJUDGED: dict[str, None] = dict.fromkeys(("verdict", "note", "judged_by", "judg
 
 @dataclass(frozen=True)
 class TrackSummary:
-    """What a list says of a track.
+    """The summary of a track for lists.
 
     Attributes:
         frames: Of its stretch.
@@ -96,7 +96,7 @@ class Track:
 
 
 def summarize_track(track: BallTrack, like: TrackSummary) -> TrackSummary:
-    """What a list says of a track.
+    """The summary of a track for lists.
 
     Args:
         track: With its corrections.
@@ -171,7 +171,7 @@ def build_track_from_row(
 
 
 def parse_track_summary(row: Any) -> TrackSummary:
-    """What a list says of a row's track."""
+    """The summary of the track of a row, for lists."""
     with translate_shape_errors_to_damage():
         return TrackSummary(**parse_json_column(row.summary))
 
@@ -182,7 +182,7 @@ def make_track_etag(row: Any) -> str:
 
 
 def parse_corrections(row: Any) -> tuple[EventCorrection, ...]:
-    """What people said of the events of a row's track."""
+    """The corrections that people made to the events of the track of a row."""
     with translate_shape_errors_to_damage():
         return corrections_from_json(parse_json_column(row.corrections))
 

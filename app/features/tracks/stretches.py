@@ -215,7 +215,7 @@ def build_stretches(
 def match_stored_to_stretches(
     stretches: Iterable[Stretch], stored: Iterable[Stored]
 ) -> dict[str, Stored]:
-    """What is stored of stretches, by their keys.
+    """The stored tracks of stretches, by the keys of the stretches.
 
     A stretch is what was stored under its key, or else what shares the most frames with it in its match: one
     more group, or another cut, makes it no other. Nothing is of two stretches.

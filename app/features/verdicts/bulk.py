@@ -115,7 +115,7 @@ def plan_verdicts(
     reason: str | None = None,
     note: str | None = None,
 ) -> BulkPlan:
-    """What a verdict on all groups of a query would do; nothing is saved.
+    """The plan of a verdict on all groups of a query; nothing is saved.
 
     Raises:
         InputError: The query or the verdict cannot be.

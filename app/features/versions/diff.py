@@ -100,7 +100,7 @@ class VersionDiff:
 
 
 def diff_versions(store: Store, older: int, newer: int) -> VersionDiff:
-    """What changed from one version to another of the same dataset.
+    """The differences between two versions of the same dataset.
 
     Raises:
         NotFoundError: There is no such version.

@@ -125,7 +125,7 @@ class FreezePlan:
 def plan_freeze(
     store: Store, dataset: str | int, request: FreezeRequest, *, strict: bool = False
 ) -> FreezePlan:
-    """What ``freeze_dataset`` would do; saves nothing.
+    """The plan of ``freeze_dataset``; saves nothing.
 
     Args:
         store: The database.

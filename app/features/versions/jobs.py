@@ -109,7 +109,7 @@ def run_verify_job(store: Store, progress: JobProgress) -> Json:
 
 
 def make_version_result(version: Version) -> dict[str, Any]:
-    """What the job of a freeze leaves."""
+    """The result of a freeze job."""
     return {
         "version": version.id,
         "name": version.name,

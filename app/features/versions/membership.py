@@ -171,7 +171,7 @@ def describe_version_settings(version: Version) -> dict[str, Json]:
 
 
 def describe_policy_settings(policy: Policy, solver_version: str) -> dict[str, Json]:
-    """What judged and what computed."""
+    """The policy and the solver of the version, for the manifest."""
     return {
         "policy": policy_to_json(policy),
         "policy_hash": policy.hash,

@@ -205,7 +205,7 @@ def find_next_delivery_time(session: Session) -> str | None:
 def read_deliveries(
     session: Session, webhook_id: int, before: int | None, most: int
 ) -> Sequence[DeliveryModel]:
-    """What a webhook was told, newest first, from below an id."""
+    """The deliveries of a webhook, newest first, from below an id."""
     where = [DeliveryModel.webhook_id == webhook_id]
     if before is not None:
         where.append(DeliveryModel.id < before)
@@ -332,7 +332,7 @@ def queue_messages_about_batch(
 
 
 def read_message_values_of_batch(session: Session, batch_id: int) -> dict[str, Any] | None:
-    """What a message says of a batch; None where it is gone."""
+    """The values of a batch for a message; None where it was deleted."""
     row = find_batch(session, batch_id)
     if row is None:
         return None

@@ -162,7 +162,7 @@ def list_deliveries(
     cursor: Cursor = None,
     before: Before = None,
 ) -> DeliveryList:
-    """What a webhook was told in the last 30 days, newest first."""
+    """The deliveries of a webhook in the last 30 days, newest first."""
     start = parse_descending_cursor(cursor, before)
     found = webhooks.list_deliveries(store, dataset, webhook, before=start, most=limit + 1)
     more = str(found[limit - 1].id) if len(found) > limit else None

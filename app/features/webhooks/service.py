@@ -185,7 +185,7 @@ def remove_webhook(store: Store, dataset: str, webhook_id: int, *, actor: str) -
 def list_deliveries(
     store: Store, dataset: str, webhook_id: int, *, before: int | None = None, most: int = 50
 ) -> list[Delivery]:
-    """What a webhook was told, newest first, from below an id."""
+    """The deliveries of a webhook, newest first, from below an id."""
     number = _find_dataset_id(store, dataset)
     with store.read() as session:
         _read_webhook(session, number, webhook_id)

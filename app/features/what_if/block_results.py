@@ -99,7 +99,7 @@ class BlockResults:
         return int(rows + uncertainty + sum(array.nbytes for array in arrays))
 
     def judge_with_policy(self, policy: Policy) -> Judgement:
-        """What another policy makes of the groups."""
+        """The judgement of the groups under another policy."""
         if _uses_click_noise(policy) and get_click_noise(policy) != get_click_noise(self.policy):
             jac = _jac_at_policy_gamma(self.facts, self.jac, policy)
             return judge_groups(self.facts, policy, self._get_uncertainty(), jac)

@@ -250,7 +250,7 @@ def write_cached_results(folder: Path, block: CachedBlock, judged: BlockResults)
 
 
 def read_cached_results(folder: Path, block: CachedBlock, policy: Policy) -> BlockResults | None:
-    """What was kept of a block under this policy; None where nothing was."""
+    """The cached results of a block under this policy; None where there are none."""
     if not block.name:
         return None
     try:

@@ -184,7 +184,7 @@ class YieldDocument(Document):
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @limit(COMPUTE)
 def read_yield(dataset: DatasetPath, services: AppServices) -> Yield:
-    """What the policy lets through: funnel, curves, splits, distances, leakage.
+    """The yield of the policy: funnel, curves, splits, distances, leakage.
 
     What the answer is counted from is kept and follows every change. Where more than twenty
     thousand groups have changed since somebody looked, they are read first: until then the answer

@@ -60,14 +60,14 @@ class TableBlock:
 
     @cached_property
     def present_counts(self) -> GroupCounts:
-        """What is counted of its groups under the present policy."""
+        """The counts of its groups under the present policy."""
         judgement = self.judged.judgement
         return count_table_groups(
             self.table, self.live_rows, self.judged.policy, judgement, judgement
         )
 
     def count_under_policy(self, policy: Policy) -> GroupCounts:
-        """What is counted of them under another one."""
+        """The counts of its groups under another policy."""
         judgement = self.judged.judge_with_policy(policy)
         return count_table_groups(
             self.table,

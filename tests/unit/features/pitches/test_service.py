@@ -18,10 +18,10 @@ from app.features.groups.undo import undo_group_edit
 from app.features.imports.ingest import import_groups
 from app.features.pitches.service import (
     change_pitches,
-    choose_requested_sizes,
     estimate_pitches,
     list_matches_to_estimate,
     parse_pitch,
+    pitch_size_by_match,
     read_pitches,
     set_pitch_of_groups,
     update_pitch_findings,
@@ -333,7 +333,7 @@ class TestReadPitches:
             assert right.previous is None
             if wanted == TRUE:
                 with pytest.raises(InputError, match="no earlier pitch size"):
-                    choose_requested_sizes(read_pitches(solved, "demo"), SMALL, size="previous")
+                    pitch_size_by_match(read_pitches(solved, "demo"), SMALL, size="previous")
 
     def test_groups_that_changed_alike_one_after_the_other_had_one_size_before(self, solved):
         for ids in ([1], [2, 3, 4, 5]):
