@@ -59,7 +59,7 @@ DEVIATION_M = 0.3
 """Standard deviation of a frame's position from its tripod: a lens turns before the head."""
 FARTHEST_M = 4 * DEVIATION_M
 """Frames that lie farther from their tripod stand on none, or show other markings than it was thought."""
-BESIDE_PX, BESIDE, TRAVELS = 0.15, 1.5, 0.1
+BESIDE_PX, BESIDE, TRAVELS = 0.05, 1.5, 0.2
 """A camera left its paint where that is this much farther from it than it was, pixels at 960 x 540, and so many times as
 far; and the share of the frames with such cameras from which on they stand on no tripod."""
 KAPPA_DEVIATION, KAPPA_SLOPE_SIGMA = 0.002, 0.03

@@ -17,10 +17,12 @@ from app.errors import GeometryError
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.paint.candidates import MAIN, WIDE
+from app.paint.frame_pitch import find_shared_pitch
 from app.paint.snap import WINDOWS, snap_to_prepared_picture
 from app.soccer.paint_evidence import NO_PAINT
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
+from app.solving.tripod_pitch import MOST_FRAMES
 from app.tracking.clip import Clip
 from app.tracking.follow import (
     BRIDGED,
@@ -146,14 +148,30 @@ def _is_uncertain_camera_confirmed(
     far = [frame for frame in tracked if turns[frame.number] >= LEAST_TURN_DEGREES]
     if len(tracked) < LEAST_HELD * len(trial.frames) or not far:
         return False
-    for frame in sorted(far, key=lambda frame: turns[frame.number])[:: -max(len(far) // ASKED, 1)]:
-        picture = make_frame_picture(next(clip.frames(frame.number, frame.number + 1)))
-        found = propose_camera_in_picture(
-            picture, follower.pitch, [start], follower.policy, (MAIN, WIDE)
-        )
-        if found.outcome == "proposed" and _shows_same_grass(found.camera, frame.camera, 0):
-            return True
-    return False
+    chosen = sorted(far, key=lambda frame: turns[frame.number])[:: -max(len(far) // ASKED, 1)]
+    return any(
+        _is_proposed(clip, frame, follower.pitch, follower.policy, [start]) for frame in chosen
+    )
+
+
+def _is_proposed(
+    clip: Clip,
+    frame: TrackedFrame,
+    pitch: Pitch,
+    policy: CalibrationPolicy,
+    known: Sequence[Camera] = (),
+) -> bool:
+    """Whether a search in its picture alone finds the camera of a frame for certain.
+
+    Args:
+        known: Cameras at whose positions it is sought besides.
+    """
+    picture = make_frame_picture(next(clip.frames(frame.number, frame.number + 1)))
+    try:
+        found = propose_camera_in_picture(picture, pitch, known, policy, (MAIN, WIDE))
+    except (GeometryError, np.linalg.LinAlgError):
+        return False
+    return found.outcome == "proposed" and _shows_same_grass(found.camera, frame.camera, 0)
 
 
 def _turn_degrees(one: Camera, other: Camera | None) -> float:
@@ -293,10 +311,18 @@ def _drop_cameras_of_unconfirmed_runs(
         if any(frame.is_key for frame in run):
             continue
         asked = [frame for frame in run if frame.outcome == TRACKED]
-        for frame in asked[len(asked) // (2 * ASKED) :: max(len(asked) // ASKED, 1)]:
-            if _is_at_key_frame_position(clip, frame, keys, pitch, policy):
-                frames[frame.number] = replace(frame, is_key=True)
-                break
+        chosen = asked[len(asked) // (2 * ASKED) :: max(len(asked) // ASKED, 1)]
+        near = (
+            frame for frame in chosen if _is_at_key_frame_position(clip, frame, keys, pitch, policy)
+        )
+        confirmed = next(near, None)
+        if confirmed is None and _stand_on_one_tripod(frames, asked, pitch, policy):
+            confirmed = chosen[0]
+        if confirmed is None:
+            again = (frame for frame in chosen if _is_proposed(clip, frame, pitch, policy))
+            confirmed = next(again, None)
+        if confirmed is not None:
+            frames[confirmed.number] = replace(confirmed, is_key=True)
         else:
             for number in range(start, end):
                 frames[number] = replace(
@@ -325,6 +351,34 @@ def _is_at_key_frame_position(
         return False
     away = [float(np.linalg.norm(snapped.camera.position - key.position)) for key in keys]
     return min(away, default=np.inf) < SAME_STAND_M
+
+
+def _stand_on_one_tripod(
+    frames: Sequence[TrackedFrame],
+    asked: Sequence[TrackedFrame],
+    pitch: Pitch,
+    policy: CalibrationPolicy,
+) -> bool:
+    """Whether frames lie on the paint of the pitch that those of runs with a key frame show, by cameras on their tripod.
+
+    On a pitch that is not quite the plan, cameras of one tripod lie metres apart.
+    """
+    held = [frame.outcome != LOST for frame in frames]
+    edges = np.flatnonzero(np.diff([False, *held, False]))
+    known = [
+        frame
+        for start, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+        if any(frame.is_key for frame in frames[start:end])
+        for frame in frames[start:end]
+        if frame.outcome == TRACKED
+    ]
+    both = [
+        frame.snapped
+        for each in (known, asked)
+        for frame in each[:: max(len(each) // (MOST_FRAMES // 2), 1)]
+        if frame.snapped is not None
+    ]
+    return find_shared_pitch(both, pitch, policy) is not None
 
 
 def _propagate_camera(

@@ -24,6 +24,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.tracking.follow import BRIDGED, LOST, TRACKED, TrackedFrame
 from app.tracking.motion import BackgroundMatches
+from app.tracking.shot import _stand_on_one_tripod
 from app.tracking.shot_equations import compute_inverse_diagonal_blocks, solve_tridiagonal
 from app.tracking.shot_solve import solve_shot
 from tests.unit.paint.lawns import SMALL, TRUE
@@ -60,7 +61,10 @@ def shot(
         apart = truth.project(traced.places) - found.project(traced.places)
         offsets = (apart * traced.normals).sum(axis=1) + noise
         evidence = DetectedPaint(traced, offsets, sigmas, np.full(len(sigmas), 50.0))
-        snapped = SnappedCamera(found, evidence, 0.1, None, 0.0, None, (SMALL.height, SMALL.width))
+        error = float(np.median(np.abs(noise)))
+        snapped = SnappedCamera(
+            found, evidence, error, None, 0.0, None, (SMALL.height, SMALL.width)
+        )
         frames.append(TrackedFrame(number, number / 25, TRACKED, found, snapped))
         if number:
             here = rng.uniform((20, 20), (940, 520), (80, 2))
@@ -134,6 +138,18 @@ def test_bridged_frames_of_a_camera_that_travels_lie_between_those_beside_them()
         assert own[X, X] > tracked[X, X]
 
 
+@pytest.mark.parametrize(("speed_m", "same"), [(0.0, True), (0.4, False)])
+def test_frames_behind_a_gap_stand_on_the_tripod_of_those_before_it_or_do_not(
+    speed_m: float, same: bool
+):
+    frames, _ = shot(np.random.default_rng(7), 0.05, 0.0, 16)
+    frames[5] = replace(frames[5], is_key=True)
+    later, _ = shot(np.random.default_rng(8), 0.05, speed_m, 40)
+    gap = [replace(frame, outcome=LOST, camera=None, snapped=None) for frame in later[16:20]]
+    both = [*frames, *gap, *later[20:]]
+    assert _stand_on_one_tripod(both, later[20:], Pitch(), CalibrationPolicy()) is same
+
+
 def test_frames_without_paint_lie_between_those_beside_them_and_lost_ones_stay_lost():
     frames, matches = shot(np.random.default_rng(3), 0.2)
     for number in (5, 6):
@@ -155,7 +171,9 @@ def test_two_frames_are_no_shot_and_keep_what_their_paint_says():
     frames, matches = shot(np.random.default_rng(4), 0.2)
     solved = solve(frames[:2], matches[:2])
     assert [frame.camera for frame in solved] == [frame.camera for frame in frames[:2]]
-    assert [frame.error_px for frame in solved] == [0.1, 0.1]
+    assert [frame.error_px for frame in solved] == [
+        frame.snapped.error_px for frame in frames[:2] if frame.snapped is not None
+    ]
 
 
 @pytest.mark.parametrize("count", [1, 2, 6])
