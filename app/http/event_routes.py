@@ -132,14 +132,9 @@ def read_current_events(
     return [*services.events.list_solved_events_since(start.solution, feed), *jobs]
 
 
-@router.get(
-    "",
-    operation_id="listenToEvents",
-    response_class=Response,
-    responses={**responses(404), **STREAM},
-)
+@router.get("", response_class=Response, responses={**responses(404), **STREAM})
 @may(Action.READ, dataset=OwnedKind.DATASET, where=RoleScope.SOMEWHERE)
-async def listen(
+async def listen_to_events(
     request: Request,
     start: Annotated[EventStreamStart, Depends()],
     feed: Annotated[EventListener, Depends(open_event_feed)],

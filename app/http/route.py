@@ -64,7 +64,10 @@ def get_request_pipeline(scope: Scope) -> RequestPipeline:
 
 
 class Route(APIRoute):
-    """A route that says who may ask it; raises TypeError where it does not."""
+    """A route that says who may ask it; raises TypeError where it does not.
+
+    Its operation id is the name of its function in camel case, unless it is given another one.
+    """
 
     stores_response = True
     """Whether its response is stored for a repetition under the same key."""
@@ -80,6 +83,7 @@ class Route(APIRoute):
         self.request_class = find_request_class(endpoint, options.get("methods") or ("GET",))
         content = (options.get("openapi_extra") or {}).get("requestBody", {}).get("content", {})
         self._takes_bytes = BYTES in content
+        options["operation_id"] = options.get("operation_id") or _camel_case(endpoint.__name__)
         super().__init__(path, endpoint, **options)
 
     def get_route_handler(self) -> Handler:
@@ -254,6 +258,12 @@ def list_routes(app: FastAPI) -> Iterator[tuple[str, Route]]:
         if isinstance(context.original_route, Route):
             for method in sorted((context.methods or set()) - {"HEAD"}):
                 yield f"{method} {context.path}", context.original_route
+
+
+def _camel_case(name: str) -> str:
+    """``list_saved_views`` as ``listSavedViews``."""
+    first, *others = name.split("_")
+    return first + "".join(map(str.capitalize, others))
 
 
 async def _return_not_hidden() -> bool:

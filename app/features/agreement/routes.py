@@ -248,7 +248,7 @@ def compare(
     )
 
 
-@router.get("/datasets/{dataset}/agreement", operation_id="getAgreement", responses=responses(404))
+@router.get("/datasets/{dataset}/agreement", responses=responses(404))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def get_agreement(
     dataset: DatasetPath, store: AppStore, of_batch: OfBatch = None
@@ -259,7 +259,6 @@ def get_agreement(
 
 @router.get(
     "/datasets/{dataset}/agreement/groups.csv",
-    operation_id="getAgreementFile",
     response_class=Response,
     responses={
         **responses(404),
@@ -276,13 +275,12 @@ def get_agreement_file(dataset: DatasetPath, store: AppStore, of_batch: OfBatch 
 
 @router.put(
     "/datasets/{dataset}/agreement/limits",
-    operation_id="setAgreementLimits",
     response_model=AgreementLimits,
     responses=responses(404, 413, 415),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_document_response)
-def put_limits(
+def set_agreement_limits(
     dataset: DatasetPath, edit: LimitsEdit, store: AppStore, actor: Actor
 ) -> AgreementLimits:
     """How far annotations may lie apart and still agree; counts for what is submitted from now on."""
@@ -290,37 +288,31 @@ def put_limits(
     return limits.set_limits(store, dataset, wanted, actor=actor)
 
 
-@router.get(
-    "/datasets/{dataset}/adjudications", operation_id="listWaitingGroups", responses=responses(404)
-)
+@router.get("/datasets/{dataset}/adjudications", responses=responses(404))
 @may(Action.REVIEW, dataset=OwnedKind.DATASET, whole=True)
 @paged()
-def list_undecided_groups(dataset: DatasetPath, store: AppStore) -> UndecidedGroupList:
+def list_waiting_groups(dataset: DatasetPath, store: AppStore) -> UndecidedGroupList:
     """Groups whose annotations disagree and wait for a decision, the worst first."""
     return UndecidedGroupList.model_validate({"items": adjudicate.list_open_cases(store, dataset)})
 
 
-@router.get(
-    "/groups/{group}/adjudication",
-    operation_id="getAdjudication",
-    response_model=CaseDocument,
-    responses=responses(404),
-)
+@router.get("/groups/{group}/adjudication", response_model=CaseDocument, responses=responses(404))
 @may(Action.REVIEW, group=OwnedKind.GROUP)
-def get_case(group: Id, store: AppStore, actor: Actor) -> Response:
+def get_adjudication(group: Id, store: AppStore, actor: Actor) -> Response:
     """The annotations of a group that disagree, beside each other."""
     return make_document_response(CaseDocument.of(adjudicate.read_case(store, group, actor=actor)))
 
 
 @router.post(
     "/groups/{group}/adjudication",
-    operation_id="decideAdjudication",
     response_model=GroupDocument,
     responses={**responses(403, 404, 409, 413, 415), 200: {"headers": ETAG}},
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
 @respond_with(make_group_response)
-def decide(group: Id, decision: Decision, services: AppServices, actor: Actor) -> GroupState:
+def decide_adjudication(
+    group: Id, decision: Decision, services: AppServices, actor: Actor
+) -> GroupState:
     """Take one annotation over into the group, or let a third one begin from it."""
     return adjudicate.adjudicate_case(
         services.store,
@@ -334,13 +326,12 @@ def decide(group: Id, decision: Decision, services: AppServices, actor: Actor) -
 
 @router.post(
     "/groups/{group}/adjudication/return",
-    operation_id="returnForCorrection",
     status_code=204,
     responses=responses(403, 404, 409, 413, 415),
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
 @respond_with(make_empty_response)
-def return_annotation(
+def return_for_correction(
     group: Id, back: AnnotationReturn, store: AppStore, actor: Actor
 ) -> DisclosedAnnotation:
     """Return one of the annotations to its person; it is compared again when it is submitted."""

@@ -95,7 +95,7 @@ def _format_time(at: datetime | None) -> str | None:
 Asked = Annotated[AuditQuery, Depends(parse_audit_query)]
 
 
-@router.get("", operation_id="getAudit", response_model=AuditDocument, responses=responses(404))
+@router.get("", response_model=AuditDocument, responses=responses(404))
 @may(Action.LEAD, dataset=OwnedKind.DATASET, group=OwnedKind.GROUP, where=RoleScope.SOMEWHERE)
 def get_audit(
     store: AppStore,
@@ -123,7 +123,6 @@ def get_audit(
 
 @router.get(
     "/export.{ending}",
-    operation_id="exportAudit",
     response_class=Response,
     responses={
         **responses(404),

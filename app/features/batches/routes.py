@@ -276,17 +276,17 @@ def _announce_lease(services: Services, lease: Lease) -> Lease:
     return lease
 
 
-@router.get("/work", operation_id="getMyWork", responses=responses())
+@router.get("/work", responses=responses())
 @may(Action.READ, where=RoleScope.SOMEWHERE)
 @paged()
-def my_work(store: AppStore, visibility: Sees, members: Members) -> MyWork:
+def get_my_work(store: AppStore, visibility: Sees, members: Members) -> MyWork:
     """Open batches of whoever asks; on a server without accounts all of them."""
     return MyWork.model_validate(
         {"items": progress.list_own_batches(store, members.member_in_dataset, visibility)}
     )
 
 
-@router.get("/datasets/{dataset}/batches", operation_id="listBatches", responses=responses(404))
+@router.get("/datasets/{dataset}/batches", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET)
 @paged()
 def list_batches(dataset: DatasetPath, store: AppStore) -> WorkBatchList:
@@ -303,7 +303,6 @@ def _created_response(batch: Batch) -> Response:
 
 @router.post(
     "/datasets/{dataset}/batches",
-    operation_id="makeBatch",
     response_model=WorkBatchDocument,
     status_code=201,
     responses={
@@ -322,10 +321,10 @@ def make_batch(dataset: DatasetPath, new: NewBatchDocument, store: AppStore, act
     return batches.make_batch(store, dataset, wanted, actor=actor)
 
 
-@router.get("/datasets/{dataset}/team-work", operation_id="getTeamWork", responses=responses(404))
+@router.get("/datasets/{dataset}/team-work", responses=responses(404))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @paged()
-def team_work(dataset: DatasetPath, store: AppStore) -> TeamWork:
+def get_team_work(dataset: DatasetPath, store: AppStore) -> TeamWork:
     """Every batch of a dataset: who has done what, how fast, and which batch has stalled."""
     items = [
         {**vars(one), "here": one.batch.here, "gold_every": one.batch.gold_every}
@@ -334,12 +333,7 @@ def team_work(dataset: DatasetPath, store: AppStore) -> TeamWork:
     return TeamWork.model_validate({"items": items})
 
 
-@router.get(
-    "/batches/{batch}",
-    operation_id="getBatch",
-    response_model=WorkBatchDocument,
-    responses=responses(404),
-)
+@router.get("/batches/{batch}", response_model=WorkBatchDocument, responses=responses(404))
 @may(Action.READ, batch=OwnedKind.WORK)
 def get_batch(batch: Id, store: AppStore) -> Batch:
     """One batch."""
@@ -347,10 +341,7 @@ def get_batch(batch: Id, store: AppStore) -> Batch:
 
 
 @router.patch(
-    "/batches/{batch}",
-    operation_id="changeBatch",
-    response_model=WorkBatchDocument,
-    responses=responses(404, 409, 413, 415),
+    "/batches/{batch}", response_model=WorkBatchDocument, responses=responses(404, 409, 413, 415)
 )
 @may(Action.LEAD, batch=OwnedKind.WORK)
 @respond_with(make_document_responder(WorkBatchDocument.model_validate))
@@ -361,9 +352,7 @@ def change_batch(batch: Id, change: BatchEdit, store: AppStore, actor: Actor) ->
     return batches.change_batch(store, batch, actor=actor, never_due=never, no_gold=none, **values)
 
 
-@router.delete(
-    "/batches/{batch}", operation_id="deleteBatch", status_code=204, responses=responses(404)
-)
+@router.delete("/batches/{batch}", status_code=204, responses=responses(404))
 @may(Action.LEAD, batch=OwnedKind.WORK)
 @respond_with(make_empty_response)
 def delete_batch(batch: Id, store: AppStore, actor: Actor) -> Batch:
@@ -371,7 +360,7 @@ def delete_batch(batch: Id, store: AppStore, actor: Actor) -> Batch:
     return batches.remove_batch(store, batch, actor=actor)
 
 
-@router.get("/batches/{batch}/groups", operation_id="listBatchGroups", responses=responses(404))
+@router.get("/batches/{batch}/groups", responses=responses(404))
 @may(Action.READ, batch=OwnedKind.WORK, whole=True)
 @paged()
 def list_batch_groups(batch: Id, store: AppStore) -> BatchGroupList:
@@ -380,10 +369,7 @@ def list_batch_groups(batch: Id, store: AppStore) -> BatchGroupList:
 
 
 @router.post(
-    "/batches/{batch}/next",
-    operation_id="openNextGroup",
-    response_model=LeaseDocument,
-    responses=responses(404, 409, 413, 415),
+    "/batches/{batch}/next", response_model=LeaseDocument, responses=responses(404, 409, 413, 415)
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
 def open_next_group(
@@ -401,7 +387,6 @@ def open_next_group(
 
 @router.put(
     "/batches/{batch}/groups/{group}/lease",
-    operation_id="openGroup",
     response_model=LeaseDocument,
     responses=responses(404, 409, 413, 415),
 )
@@ -415,14 +400,9 @@ def open_group(
     return _announce_lease(services, lease)
 
 
-@router.delete(
-    "/batches/{batch}/groups/{group}/lease",
-    operation_id="releaseGroup",
-    status_code=204,
-    responses=responses(404),
-)
+@router.delete("/batches/{batch}/groups/{group}/lease", status_code=204, responses=responses(404))
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
-def leave_group_to_others(batch: Id, group: Id, services: AppServices, members: Members) -> None:
+def release_group(batch: Id, group: Id, services: AppServices, members: Members) -> None:
     """Leave a group to others."""
     worker = members.member_of_batch(services.store, batch)
     _announce_lease(services, LeaseService(services.store).release_group(batch, group, worker))
@@ -430,7 +410,6 @@ def leave_group_to_others(batch: Id, group: Id, services: AppServices, members: 
 
 @router.put(
     "/batches/{batch}/groups/{group}/submission",
-    operation_id="submitGroup",
     response_model=LeaseDocument,
     responses=responses(404, 409, 413, 415),
 )
@@ -454,7 +433,6 @@ def submit_group(
 
 @router.delete(
     "/batches/{batch}/groups/{group}/submission",
-    operation_id="withdrawSubmission",
     response_model=LeaseDocument,
     responses=responses(404, 409),
 )
@@ -471,7 +449,6 @@ def withdraw_submission(
 
 @router.post(
     "/batches/{batch}/groups/{group}/return",
-    operation_id="returnGroup",
     response_model=LeaseDocument,
     responses=responses(404, 409, 413, 415),
 )

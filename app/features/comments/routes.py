@@ -123,14 +123,14 @@ class MentionablePeople(Document):
     names: list[str]
 
 
-@router.get("/people", operation_id="listPeopleOfGroup", responses=responses(404))
+@router.get("/people", responses=responses(404))
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
-def list_people_to_mention(group: Id, store: AppStore) -> MentionablePeople:
+def list_people_of_group(group: Id, store: AppStore) -> MentionablePeople:
     """The people who can be mentioned in comments on the group: all who see it."""
     return MentionablePeople(names=comments.list_mentionable_people(store, group))
 
 
-@router.get("/threads", operation_id="listThreads", responses=responses(404))
+@router.get("/threads", responses=responses(404))
 @may(Action.READ, group=OwnedKind.GROUP)
 @paged()
 def list_threads(group: Id, store: AppStore, actor: Actor) -> ThreadList:
@@ -145,7 +145,6 @@ def _thread_response(thread: comments.StoredThread, actor: str, status: int = 20
 
 @router.post(
     "/threads",
-    operation_id="beginThread",
     response_model=ThreadDocument,
     status_code=201,
     responses=responses(404, 409, 413, 415),
@@ -162,10 +161,7 @@ def begin_thread(group: Id, new: NewThread, store: AppStore, actor: Actor) -> co
 
 
 @router.patch(
-    "/threads/{thread}",
-    operation_id="changeThread",
-    response_model=ThreadDocument,
-    responses=responses(404, 409, 413, 415),
+    "/threads/{thread}", response_model=ThreadDocument, responses=responses(404, 409, 413, 415)
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @respond_with(_thread_response, "actor")
@@ -178,14 +174,13 @@ def change_thread(
 
 @router.post(
     "/threads/{thread}/comments",
-    operation_id="replyToThread",
     response_model=ThreadDocument,
     status_code=201,
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @respond_with(partial(_thread_response, status=201), "actor")
-def reply(
+def reply_to_thread(
     group: Id, thread: Id, new: NewComment, store: AppStore, actor: Actor
 ) -> comments.StoredThread:
     """Say something in a thread; who spoke there before is told."""
@@ -194,7 +189,6 @@ def reply(
 
 @router.patch(
     "/threads/{thread}/comments/{comment}",
-    operation_id="changeComment",
     response_model=ThreadDocument,
     responses=responses(403, 404, 409, 413, 415),
 )
@@ -208,10 +202,7 @@ def change_comment(
 
 
 @router.delete(
-    "/threads/{thread}/comments/{comment}",
-    operation_id="deleteComment",
-    status_code=204,
-    responses=responses(403, 404),
+    "/threads/{thread}/comments/{comment}", status_code=204, responses=responses(403, 404)
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @respond_with(make_empty_response)

@@ -113,7 +113,7 @@ class DeletionResultDocument(BaseModel):
     )
 
 
-@router.get("", operation_id="listDatasets", responses=responses())
+@router.get("", responses=responses())
 @may(Action.READ, where=RoleScope.SOMEWHERE)
 @paged()
 def list_datasets(request: Request, store: AppStore, visibility: Sees) -> DatasetList:
@@ -123,19 +123,14 @@ def list_datasets(request: Request, store: AppStore, visibility: Sees) -> Datase
     return DatasetList(items=review.list_datasets(store, visibility, own))
 
 
-@router.get(
-    "/{dataset}",
-    operation_id="getDataset",
-    response_model=DatasetDocument,
-    responses=responses(404),
-)
+@router.get("/{dataset}", response_model=DatasetDocument, responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET)
 def get_dataset(dataset: DatasetPath, store: AppStore) -> review.Dataset:
     """One dataset by name or id."""
     return review.get_dataset(store, dataset)
 
 
-@router.get("/{dataset}/summary", operation_id="getSummary", responses=responses(404))
+@router.get("/{dataset}/summary", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET)
 def get_summary(dataset: DatasetPath, store: AppStore, query: QueryText = "") -> SummaryDocument:
     """Progress and histograms over the groups that a query matches."""
@@ -144,9 +139,7 @@ def get_summary(dataset: DatasetPath, store: AppStore, query: QueryText = "") ->
     return SummaryDocument(progress=counted, histograms=counted.histograms)
 
 
-@router.post(
-    "/{dataset}/solve", operation_id="solveDataset", **describe_job_response_for_openapi(404)
-)
+@router.post("/{dataset}/solve", **describe_job_response_for_openapi(404))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def solve_dataset(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
@@ -163,10 +156,7 @@ def _deleted_response(gone: DatasetContents, dry_run: bool) -> Response:
 
 
 @router.delete(
-    "/{dataset}",
-    operation_id="deleteDataset",
-    response_model=DeletionResultDocument,
-    responses=responses(404, 409, 413, 415),
+    "/{dataset}", response_model=DeletionResultDocument, responses=responses(404, 409, 413, 415)
 )
 @may(Action.ADMINISTER, dataset=OwnedKind.DATASET)
 @respond_with(_deleted_response, "dry_run")

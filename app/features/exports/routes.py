@@ -214,14 +214,10 @@ class ExportPage(ListDocument[ExportDocument]):
     """Exports, the newest first; ``next`` is the cursor of the next page."""
 
 
-@router.get(
-    "/datasets/{dataset}/export-formats",
-    operation_id="listExportFormats",
-    responses=responses(400, 404),
-)
+@router.get("/datasets/{dataset}/export-formats", responses=responses(400, 404))
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
-def list_formats(
+def list_export_formats(
     dataset: DatasetPath,
     store: AppStore,
     version: Annotated[
@@ -248,7 +244,6 @@ def _export_job_response(job: Job) -> Response:
 
 @router.post(
     "/exports",
-    operation_id="makeExport",
     status_code=202,
     response_model=ExportJobDocument,
     responses={**responses(404, 409, 413, 415, 507), **ACCEPTED},
@@ -267,7 +262,7 @@ def make_export(request: ExportRequest, services: AppServices, actor: Actor) -> 
     )
 
 
-@router.get("/exports", operation_id="listExports", responses=responses(404))
+@router.get("/exports", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET, where=RoleScope.SOMEWHERE, whole=True)
 def list_exports(
     services: AppServices,
@@ -293,7 +288,7 @@ def list_exports(
     return ExportPage(items=items, next=more)
 
 
-@router.get("/exports/{export}", operation_id="getExport", responses=responses(404))
+@router.get("/exports/{export}", responses=responses(404))
 @may(Action.READ, export=OwnedKind.EXPORT)
 def get_export(export: ExportId, services: AppServices) -> ExportDocument:
     """An export: its request, progress and result."""
@@ -302,7 +297,6 @@ def get_export(export: ExportId, services: AppServices) -> ExportDocument:
 
 @router.delete(
     "/exports/{export}",
-    operation_id="deleteExport",
     status_code=204,
     response_class=Response,
     responses={**responses(404, 409), 204: {"description": "It is gone."}},
@@ -333,13 +327,12 @@ async def wait_for_export(export: ExportId, services: AppServices) -> str:
 
 @router.get(
     "/exports/{export}/content",
-    operation_id="getExportContent",
     response_class=FileResponse,
     responses={**responses(404, 409, 503), **ZIP},
 )
 @may(Action.READ, export=OwnedKind.EXPORT)
 @limit(TRANSFER)
-def get_content(
+def get_export_content(
     export: Annotated[str, Depends(wait_for_export)], services: AppServices, request: Request
 ) -> Response:
     """The zip itself; waits a while for one that is still being written.

@@ -22,7 +22,7 @@ FindingKind = Literal[FINDING_KINDS]  # type: ignore[valid-type]
 MAX_GROUPS = 200
 
 
-@router.get("", operation_id="listFindings", responses=responses(404))
+@router.get("", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET)
 def list_findings(
     store: AppStore,

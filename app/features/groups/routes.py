@@ -146,7 +146,7 @@ def load_group_document_of_view(store: Store, view_id: int) -> GroupDocument:
     return GroupDocument.of(submit.load_solved_group_of_view(store, view_id))
 
 
-@router.get("", operation_id="listGroups", responses=responses(404))
+@router.get("", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET)
 def list_groups(
     store: AppStore,
@@ -186,7 +186,7 @@ def list_groups(
     return GroupPage(items=items, next=page.next, total=page.total)
 
 
-@router.get("/ids", operation_id="listGroupIds", responses=responses(404))
+@router.get("/ids", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET)
 def list_group_ids(
     store: AppStore,
@@ -206,7 +206,6 @@ def list_group_ids(
 
 @router.get(
     "/{group}",
-    operation_id="getGroup",
     response_model=GroupDocument,
     responses={**responses(404), 200: {"headers": ETAG}, 304: {"description": "Not changed."}},
 )
@@ -220,7 +219,7 @@ def get_group(group: Id, store: AppStore, request: Request) -> Response:
     return make_group_response(submit.load_solved_group(store, group))
 
 
-@router.get("/{group}/solution", operation_id="getSolution", responses=responses(404))
+@router.get("/{group}/solution", responses=responses(404))
 @may(Action.READ, group=OwnedKind.GROUP)
 def get_solution(group: Id, store: AppStore) -> SolutionDocument:
     """The solution of a group."""
@@ -230,19 +229,14 @@ def get_solution(group: Id, store: AppStore) -> SolutionDocument:
     return SolutionDocument.of(state.solution, state.group, state.dismissed)
 
 
-@router.get(
-    "/{group}/neighbours",
-    operation_id="getNeighbours",
-    response_model=Neighbours,
-    responses=responses(404),
-)
+@router.get("/{group}/neighbours", response_model=Neighbours, responses=responses(404))
 @may(Action.READ, group=OwnedKind.GROUP)
 def get_neighbours(group: Id, store: AppStore, query: QueryText = "") -> queue.Neighbours:
     """Where the group stands among those that match, and up to five before and after."""
     return queue.find_neighbours(store, group, query)
 
 
-@router.get("/{group}/history", operation_id="getHistory", responses=responses(404))
+@router.get("/{group}/history", responses=responses(404))
 @may(Action.READ, group=OwnedKind.GROUP)
 @paged()
 def get_history(group: Id, store: AppStore) -> GroupHistory:
@@ -250,18 +244,15 @@ def get_history(group: Id, store: AppStore) -> GroupHistory:
     return GroupHistory(items=[LogEntryDocument.of(entry) for entry in read_history(store, group)])
 
 
-@router.get("/{group}/history/{entry}", operation_id="getHistoryStep", responses=responses(404))
+@router.get("/{group}/history/{entry}", responses=responses(404))
 @may(Action.READ, group=OwnedKind.GROUP)
-def get_entry_changes(group: Id, entry: Id, store: AppStore) -> EntryChangesDocument:
+def get_history_step(group: Id, entry: Id, store: AppStore) -> EntryChangesDocument:
     """What one entry of the history has changed: the views that differ, before and after."""
     return EntryChangesDocument.of(read_entry_changes(store, group, entry))
 
 
 @router.post(
-    "/{group}/preview",
-    operation_id="previewGroup",
-    response_model=PreviewDocument,
-    responses=responses(404, 409, 413, 415),
+    "/{group}/preview", response_model=PreviewDocument, responses=responses(404, 409, 413, 415)
 )
 @may(Action.READ, group=OwnedKind.GROUP)
 @limit(COMPUTE)
@@ -274,14 +265,11 @@ async def preview_group(
 
 
 @router.post(
-    "/{group}/undo",
-    operation_id="undoGroup",
-    response_model=GroupDocument,
-    responses={**responses(*CONFLICTS), **CHANGED},
+    "/{group}/undo", response_model=GroupDocument, responses={**responses(*CONFLICTS), **CHANGED}
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @respond_with(make_group_response)
-def undo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> GroupState:
+def undo_group(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> GroupState:
     """Take the last edit back; 409 when there is none."""
     store = services.store
     with add_current_state_to_conflicts(lambda: load_group_document(store, group)):
@@ -289,14 +277,11 @@ def undo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> G
 
 
 @router.post(
-    "/{group}/redo",
-    operation_id="redoGroup",
-    response_model=GroupDocument,
-    responses={**responses(*CONFLICTS), **CHANGED},
+    "/{group}/redo", response_model=GroupDocument, responses={**responses(*CONFLICTS), **CHANGED}
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @respond_with(make_group_response)
-def redo(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> GroupState:
+def redo_group(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> GroupState:
     """Do again what was undone last; 409 when there is nothing."""
     store = services.store
     with add_current_state_to_conflicts(lambda: load_group_document(store, group)):

@@ -81,14 +81,11 @@ FRAME: Responses = {
 
 
 @router.patch(
-    "/{view}/lines",
-    operation_id="setViewLines",
-    response_model=GroupDocument,
-    responses={**responses(*CONFLICTS), **CHANGED},
+    "/{view}/lines", response_model=GroupDocument, responses={**responses(*CONFLICTS), **CHANGED}
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
 @respond_with(make_group_response)
-def patch_lines(
+def set_view_lines(
     view: Id,
     lines: LinesEdit,
     services: AppServices,
@@ -108,14 +105,11 @@ def patch_lines(
 
 
 @router.patch(
-    "/{view}/ball",
-    operation_id="setViewBall",
-    response_model=GroupDocument,
-    responses={**responses(*CONFLICTS), **CHANGED},
+    "/{view}/ball", response_model=GroupDocument, responses={**responses(*CONFLICTS), **CHANGED}
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
 @respond_with(make_group_response)
-def patch_ball(
+def set_view_ball(
     view: Id,
     ball: Annotated[BallEdit | None, Body(description="null: no ball is annotated.")],
     services: AppServices,
@@ -136,14 +130,11 @@ def patch_ball(
 
 
 @router.patch(
-    "/{view}",
-    operation_id="changeView",
-    response_model=GroupDocument,
-    responses={**responses(*CONFLICTS), **CHANGED},
+    "/{view}", response_model=GroupDocument, responses={**responses(*CONFLICTS), **CHANGED}
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
 @respond_with(make_group_response)
-def patch_view(
+def change_view(
     view: Id, change: ViewEdit, services: AppServices, actor: Actor, if_match: IfMatch
 ) -> GroupState:
     """Leave the view out and say why, take it in again, choose its calibration, say its picture."""
@@ -175,10 +166,7 @@ def _submit_view_edit(
 
 
 @router.get(
-    "/{view}/image",
-    operation_id="getImage",
-    response_class=Response,
-    responses={**responses(404, 413, 503), **FRAME},
+    "/{view}/image", response_class=Response, responses={**responses(404, 413, 503), **FRAME}
 )
 @may(Action.READ, view=OwnedKind.VIEW)
 @limit(TRANSFER)
@@ -218,16 +206,11 @@ async def get_image(
     return Response(picture.data, media_type=picture.kind, headers=headers)
 
 
-@router.get(
-    "/{view}/neighbours",
-    operation_id="getFramesAround",
-    response_model=NeighbourFrameList,
-    responses=responses(404, 503),
-)
+@router.get("/{view}/neighbours", response_model=NeighbourFrameList, responses=responses(404, 503))
 @may(Action.READ, view=OwnedKind.VIEW)
 @limit(TRANSFER)
 @paged()
-async def get_neighbour_frames(
+async def get_frames_around(
     view: Id, services: AppServices, request: Request
 ) -> NeighbourFrameList | Response:
     """The frames of the same camera just before and after a view's, where they are on disk.

@@ -26,12 +26,7 @@ router = APIRouter(
 Digest = Annotated[str, Path(pattern=r"^[0-9a-f]{64}$", description="SHA-256 of its bytes.")]
 
 
-@router.get(
-    "",
-    operation_id="getGuidelines",
-    response_model=Guidelines,
-    responses=responses(404),
-)
+@router.get("", response_model=Guidelines, responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET)
 def get_guidelines(
     dataset: DatasetPath,
@@ -44,12 +39,7 @@ def get_guidelines(
     return guidelines.read_guidelines(store, dataset, number)
 
 
-@router.put(
-    "",
-    operation_id="writeGuidelines",
-    response_model=Guidelines,
-    responses=responses(404, 409, 413, 415),
-)
+@router.put("", response_model=Guidelines, responses=responses(404, 409, 413, 415))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_document_response)
 def write_guidelines(
@@ -63,14 +53,13 @@ def write_guidelines(
 
 @router.post(
     "/pictures",
-    operation_id="addGuidelinePicture",
     response_model=GuidelinePictureDocument,
     status_code=201,
     responses=responses(404, 409, 413, 415, 503),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET, body={"upload": OwnedKind.UPLOAD})
 @respond_with(make_document_responder(GuidelinePictureDocument.model_validate, 201))
-def add_picture(
+def add_guideline_picture(
     dataset: DatasetPath, new: NewGuidelinePicture, services: AppServices
 ) -> guidelines.GuidelinePicture:
     """Keep an uploaded picture; the text shows it by its digest."""
@@ -79,7 +68,6 @@ def add_picture(
 
 @router.get(
     "/pictures/{digest}",
-    operation_id="getGuidelinePicture",
     response_class=Response,
     responses={
         **responses(404),
@@ -94,7 +82,7 @@ def add_picture(
     },
 )
 @may(Action.READ, dataset=OwnedKind.DATASET)
-def get_picture(
+def get_guideline_picture(
     dataset: DatasetPath, digest: Digest, store: AppStore, request: Request
 ) -> Response:
     """A picture of the guidelines."""

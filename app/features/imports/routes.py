@@ -47,24 +47,15 @@ FolderPath = Annotated[
 ]
 
 
-@imports_router.get(
-    "/folders",
-    operation_id="listImportFolders",
-    response_model=FolderDocument,
-    responses=responses(404),
-)
+@imports_router.get("/folders", response_model=FolderDocument, responses=responses(404))
 @may(Action.LEAD, where=RoleScope.EVERYWHERE)
 @paged()
-def get_folders(services: AppServices, path: FolderPath = "") -> FolderListing:
+def list_import_folders(services: AppServices, path: FolderPath = "") -> FolderListing:
     """What may be imported from: the operator names folders in TOUCHLINE_IMPORT_FOLDERS."""
     return list_folder(services.settings, path)
 
 
-@imports_router.post(
-    "",
-    operation_id="startImport",
-    **describe_job_response_for_openapi(404, 413, 415, 503),
-)
+@imports_router.post("", **describe_job_response_for_openapi(404, 413, 415, 503))
 @may(
     Action.LEAD,
     body={
@@ -146,7 +137,6 @@ BODY: dict[str, Any] = {
 
 @uploads_router.post(
     "",
-    operation_id="uploadFile",
     status_code=201,
     openapi_extra=BODY,
     responses={
@@ -191,15 +181,10 @@ async def upload_file(
     return UploadDocument.model_validate(upload)
 
 
-@uploads_router.patch(
-    "/{upload}",
-    operation_id="sendPart",
-    openapi_extra=BODY,
-    responses=responses(404, 409, 413, 415, 507),
-)
+@uploads_router.patch("/{upload}", openapi_extra=BODY, responses=responses(404, 409, 413, 415, 507))
 @may(Action.LEAD, upload=OwnedKind.UPLOAD)
 @limit(TRANSFER)
-async def receive_upload_part(
+async def send_part(
     upload: UploadId, request: Request, services: AppServices, offset: PartOffset = 0
 ) -> UploadDocument:
     """Add bytes to a file that is sent in parts; `bytes` of the answer are on the disk.
@@ -290,10 +275,10 @@ async def _run_in_disk_thread(work: Callable[..., T], *arguments: Any) -> T:
     return await to_thread.run_sync(work, *arguments, limiter=threads)
 
 
-@uploads_router.get("", operation_id="listUploads", responses=responses())
+@uploads_router.get("", responses=responses())
 @may(Action.LEAD, where=RoleScope.SOMEWHERE)
 @paged()
-def get_uploads(services: AppServices, visibility: Sees, actor: Actor) -> UploadList:
+def list_uploads(services: AppServices, visibility: Sees, actor: Actor) -> UploadList:
     """Every file of one's own that is still here; an admin is shown everybody's.
 
     `used_bytes` and `quota_bytes` are of whoever asks.
@@ -308,7 +293,7 @@ def get_uploads(services: AppServices, visibility: Sees, actor: Actor) -> Upload
     )
 
 
-@uploads_router.get("/{upload}", operation_id="getUpload", responses=responses(404))
+@uploads_router.get("/{upload}", responses=responses(404))
 @may(Action.LEAD, upload=OwnedKind.UPLOAD)
 def get_upload(upload: UploadId, services: AppServices) -> UploadDocument:
     """One uploaded file, without its content."""
@@ -317,7 +302,6 @@ def get_upload(upload: UploadId, services: AppServices) -> UploadDocument:
 
 @uploads_router.delete(
     "/{upload}",
-    operation_id="deleteUpload",
     status_code=204,
     response_class=Response,
     responses={**responses(404), 204: {"description": "It is gone."}},

@@ -178,11 +178,7 @@ class GuidelinePictureDocument(Document):
 annotations_router = APIRouter(tags=["independent annotations"], route_class=Route)
 
 
-@annotations_router.get(
-    "/datasets/{dataset}/independent-annotations",
-    operation_id="listIndependentAnnotations",
-    responses=responses(404),
-)
+@annotations_router.get("/datasets/{dataset}/independent-annotations", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET)
 @paged()
 def list_independent_annotations(
@@ -207,21 +203,21 @@ def _begun_response(annotation: DisclosedAnnotation) -> Response:
 
 @annotations_router.post(
     "/groups/{group}/independent-annotations",
-    operation_id="beginIndependentAnnotation",
     response_model=DisclosedAnnotation,
     status_code=201,
     responses=responses(404, 409),
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @respond_with(_begun_response)
-def begin_own_annotation(group: Id, store: AppStore, actor: Actor) -> service.DisclosedAnnotation:
+def begin_independent_annotation(
+    group: Id, store: AppStore, actor: Actor
+) -> service.DisclosedAnnotation:
     """Begin an own annotation of a group, on a copy that nobody else sees; the one begun, if so."""
     return service.begin_annotation(store, group, person=actor)
 
 
 @annotations_router.get(
     "/groups/{group}/independent-annotation",
-    operation_id="getIndependentAnnotation",
     response_model=DisclosedAnnotation,
     responses=responses(404),
 )
@@ -233,13 +229,12 @@ def get_independent_annotation(group: Id, store: AppStore) -> service.DisclosedA
 
 @annotations_router.post(
     "/groups/{group}/submission",
-    operation_id="submitIndependentAnnotation",
     response_model=DisclosedAnnotation,
     responses=responses(403, 404, 409),
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @respond_with(make_document_response)
-def hand_in(
+def submit_independent_annotation(
     group: Id, services: AppServices, actor: Actor, background: BackgroundTasks
 ) -> service.DisclosedAnnotation:
     """Submit an independent annotation; a verdict on it does the same. Only a lead can return it."""
@@ -251,13 +246,12 @@ def hand_in(
 
 @annotations_router.post(
     "/groups/{group}/return",
-    operation_id="returnIndependentAnnotation",
     response_model=DisclosedAnnotation,
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.LEAD, group=OwnedKind.GROUP)
 @respond_with(make_document_response)
-def return_to_annotator(
+def return_independent_annotation(
     group: Id, store: AppStore, actor: Actor, why: ReturnReason | None = None
 ) -> service.DisclosedAnnotation:
     """Let the person of an annotation that was submitted go on with it, and tell them why."""
@@ -270,13 +264,12 @@ def return_to_annotator(
 
 @annotations_router.post(
     "/groups/{group}/adoption",
-    operation_id="adoptIndependentAnnotation",
     response_model=GroupDocument,
     responses={**responses(404, 409, 412), 200: {"headers": ETAG}},
 )
 @may(Action.LEAD, group=OwnedKind.GROUP)
 @respond_with(make_group_response)
-def adopt(group: Id, services: AppServices, actor: Actor) -> GroupState:
+def adopt_independent_annotation(group: Id, services: AppServices, actor: Actor) -> GroupState:
     """Take an annotation and its verdict over into the group that it is of; the answer is that group.
 
     They are its person's there, as one edit that undo takes back.
@@ -289,10 +282,7 @@ gold_router = APIRouter(tags=["independent annotations"], route_class=Route)
 
 
 @gold_router.get(
-    "/datasets/{dataset}/gold",
-    operation_id="getGoldReport",
-    response_model=GoldReportDocument,
-    responses=responses(404),
+    "/datasets/{dataset}/gold", response_model=GoldReportDocument, responses=responses(404)
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def get_gold_report(dataset: DatasetPath, store: AppStore) -> gold.GoldReport:
@@ -302,13 +292,12 @@ def get_gold_report(dataset: DatasetPath, store: AppStore) -> gold.GoldReport:
 
 @gold_router.post(
     "/datasets/{dataset}/gold",
-    operation_id="chooseGoldGroups",
     response_model=GoldChoiceResult,
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_document_response)
-def mark_known_truth_groups(
+def choose_gold_groups(
     dataset: DatasetPath, choice: GoldChoiceDocument, store: AppStore, actor: Actor
 ) -> GoldChoiceResult:
     """Make gold groups of those whose truth is known, also while batches are under way."""
@@ -318,10 +307,7 @@ def mark_known_truth_groups(
 
 
 @gold_router.put(
-    "/groups/{group}/gold",
-    operation_id="markGold",
-    response_model=GoldGroup,
-    responses=responses(404, 409, 413, 415),
+    "/groups/{group}/gold", response_model=GoldGroup, responses=responses(404, 409, 413, 415)
 )
 @may(Action.LEAD, group=OwnedKind.GROUP)
 @respond_with(make_document_response)
@@ -331,24 +317,16 @@ def mark_gold(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.
 
 
 @gold_router.patch(
-    "/groups/{group}/gold",
-    operation_id="changeGold",
-    response_model=GoldGroup,
-    responses=responses(404, 413, 415),
+    "/groups/{group}/gold", response_model=GoldGroup, responses=responses(404, 413, 415)
 )
 @may(Action.LEAD, group=OwnedKind.GROUP)
 @respond_with(make_document_response)
-def change_gold_start(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
+def change_gold(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
     """Let annotators of a gold group begin with something else; what is true of it stays."""
     return gold.set_gold_start(store, group, edit.start, actor=actor)
 
 
-@gold_router.delete(
-    "/groups/{group}/gold",
-    operation_id="unmarkGold",
-    response_model=GoldGroup,
-    responses=responses(404),
-)
+@gold_router.delete("/groups/{group}/gold", response_model=GoldGroup, responses=responses(404))
 @may(Action.LEAD, group=OwnedKind.GROUP)
 @respond_with(make_document_response)
 def unmark_gold(group: Id, store: AppStore, actor: Actor) -> gold.GoldGroup:

@@ -58,9 +58,9 @@ class Readiness(BaseModel):
     status: Literal["ready"]
 
 
-@maintenance_router.put("", operation_id="setMaintenance", responses=responses(413, 415))
+@maintenance_router.put("", responses=responses(413, 415))
 @may(Action.ADMINISTER)
-def put_maintenance_notice(new: NewBanner, store: AppStore, actor: Actor) -> Banner:
+def set_maintenance(new: NewBanner, store: AppStore, actor: Actor) -> Banner:
     """Show a notice on every page, in place of the one before.
 
     Windows that are open show it within some seconds; the login page has it, too.
@@ -70,20 +70,19 @@ def put_maintenance_notice(new: NewBanner, store: AppStore, actor: Actor) -> Ban
 
 @maintenance_router.delete(
     "",
-    operation_id="clearMaintenance",
     status_code=204,
     response_class=Response,
     responses={**responses(404), 204: {"description": "It is gone."}},
 )
 @may(Action.ADMINISTER)
-def delete_maintenance_notice(store: AppStore, actor: Actor) -> Response:
+def clear_maintenance(store: AppStore, actor: Actor) -> Response:
     """Take the notice away."""
     if not clear_banner(store, actor=actor):
         raise NotFoundError("no maintenance notice is set")
     return Response(status_code=204)
 
 
-@health_router.get("/healthz", operation_id="getHealth", responses=responses())
+@health_router.get("/healthz", responses=responses())
 @open_to_all
 @limit(None)
 async def get_health(request: Request) -> Health:
@@ -91,7 +90,7 @@ async def get_health(request: Request) -> Health:
     return Health(status="ok", version=request.app.version)
 
 
-@health_router.get("/readyz", operation_id="getReadiness", responses=responses())
+@health_router.get("/readyz", responses=responses())
 @open_to_all
 @limit(None)
 def get_readiness(store: AppStore) -> Readiness:
@@ -110,7 +109,6 @@ def get_readiness(store: AppStore) -> Readiness:
 
 @health_router.get(
     "/metrics",
-    operation_id="getMetrics",
     response_class=Response,
     responses={**responses(), 200: {"content": {CONTENT_TYPE_LATEST: {}}}},
 )

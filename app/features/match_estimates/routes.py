@@ -165,17 +165,15 @@ class NoiseDocument(Document):
     notices: list[str] = Field(description="What a person should know.")
 
 
-@positions_router.get("", operation_id="listPositions", responses=responses(404))
+@positions_router.get("", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
-def list_main_camera_positions(dataset: DatasetPath, store: AppStore) -> SharedPositionsDocument:
+def list_positions(dataset: DatasetPath, store: AppStore) -> SharedPositionsDocument:
     """Where each match's main camera stands, as far as that is shared with its pictures."""
     return SharedPositionsDocument.model_validate(get_main_camera_positions(store, dataset))
 
 
-@positions_router.post(
-    "", operation_id="sharePositions", **describe_job_response_for_openapi(404, 409, 413, 415)
-)
+@positions_router.post("", **describe_job_response_for_openapi(404, 409, 413, 415))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def share_positions(
@@ -190,12 +188,10 @@ def share_positions(
     return POSITIONS.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
-@positions_router.delete(
-    "", operation_id="revertPositions", **describe_job_response_for_openapi(404, 409)
-)
+@positions_router.delete("", **describe_job_response_for_openapi(404, 409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
-def take_back_positions(
+def revert_positions(
     dataset: DatasetPath,
     services: AppServices,
     actor: Actor,
@@ -208,11 +204,7 @@ def take_back_positions(
     return POSITIONS.undo_last_job(services.jobs, services.store, dataset, match, actor=actor)
 
 
-@rig_router.post(
-    "/datasets/{dataset}/rig",
-    operation_id="adjustRig",
-    **describe_job_response_for_openapi(404, 409, 413, 415),
-)
+@rig_router.post("/datasets/{dataset}/rig", **describe_job_response_for_openapi(404, 409, 413, 415))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def adjust_rig(
@@ -239,21 +231,16 @@ def _make_take_back_response(count: int) -> Response:
 
 
 @rig_router.delete(
-    "/datasets/{dataset}/rig",
-    operation_id="revertRig",
-    response_model=RigTakenBack,
-    responses=responses(404, 409),
+    "/datasets/{dataset}/rig", response_model=RigTakenBack, responses=responses(404, 409)
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(_make_take_back_response)
-def take_rig_back(dataset: DatasetPath, services: AppServices, actor: Actor) -> int:
+def revert_rig(dataset: DatasetPath, services: AppServices, actor: Actor) -> int:
     """Take an accepted rig back, all its cameras at once; 409 when there is none."""
     return undo_rig_adjustment(services.jobs, services.store, dataset, actor=actor)
 
 
-@noise_router.get(
-    "", operation_id="getNoise", response_model=NoiseDocument, responses=responses(404)
-)
+@noise_router.get("", response_model=NoiseDocument, responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @limit(COMPUTE)
 def get_noise(dataset: DatasetPath, services: AppServices) -> noises.NoiseReport:
@@ -265,7 +252,7 @@ def get_noise(dataset: DatasetPath, services: AppServices) -> noises.NoiseReport
     return services.noises.read(dataset)
 
 
-@noise_router.post("", operation_id="acceptNoise", **describe_job_response_for_openapi(404, 412))
+@noise_router.post("", **describe_job_response_for_openapi(404, 412))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @limit(COMPUTE)
 @respond_with(make_job_response)
@@ -285,11 +272,11 @@ def accept_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> J
     )
 
 
-@noise_router.delete("", operation_id="revertNoise", **describe_job_response_for_openapi(404))
+@noise_router.delete("", **describe_job_response_for_openapi(404))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @limit(COMPUTE)
 @respond_with(make_job_response)
-def take_noise_back(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
+def revert_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Take the balls of all cameras and people to be as noisy as the dataset's; the job solves.
 
     The policy stays as it is.
@@ -303,24 +290,20 @@ def take_noise_back(dataset: DatasetPath, services: AppServices, actor: Actor) -
     )
 
 
-@pictures_router.get("", operation_id="listMatchPictures", responses=responses(404))
+@pictures_router.get("", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
-def list_match_picture_geometries(
-    dataset: DatasetPath, store: AppStore
-) -> MatchPictureGeometriesDocument:
+def list_match_pictures(dataset: DatasetPath, store: AppStore) -> MatchPictureGeometriesDocument:
     """What the pictures of each match's main camera are taken to be: stretched, cropped or neither."""
     return MatchPictureGeometriesDocument.model_validate(
         {"items": read_picture_geometries(store, dataset)}
     )
 
 
-@pictures_router.post(
-    "", operation_id="estimateMatchPictures", **describe_job_response_for_openapi(404, 413, 415)
-)
+@pictures_router.post("", **describe_job_response_for_openapi(404, 413, 415))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
-def estimate_match_picture_geometries(
+def estimate_match_pictures(
     dataset: DatasetPath, request: MatchSelection, services: AppServices, actor: Actor
 ) -> Job:
     """Look at up to thirty frames of each match together; changes nothing.
@@ -331,12 +314,10 @@ def estimate_match_picture_geometries(
     return PICTURES.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
-@pictures_router.patch(
-    "", operation_id="setMatchPicture", **describe_job_response_for_openapi(404, 413, 415)
-)
+@pictures_router.patch("", **describe_job_response_for_openapi(404, 413, 415))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
-def set_match_picture_geometry(
+def set_match_picture(
     dataset: DatasetPath, change: MatchPictureGeometryChange, services: AppServices, actor: Actor
 ) -> Job:
     """Say what was done to the pictures of a match's main camera; the job solves its groups.

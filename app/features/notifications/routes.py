@@ -41,7 +41,7 @@ class SeenNotifications(BaseModel):
     )
 
 
-@router.get("", operation_id="getNotifications", responses=responses(401, 409))
+@router.get("", responses=responses(401, 409))
 @may(Action.ACCOUNT)
 def get_notifications(
     store: AppStore,
@@ -60,12 +60,7 @@ def get_notifications(
     return document
 
 
-@router.post(
-    "/read",
-    operation_id="markNotificationsRead",
-    response_model=NotificationsDocument,
-    responses=responses(401, 409, 413, 415),
-)
+@router.post("/read", response_model=NotificationsDocument, responses=responses(401, 409, 413, 415))
 @may(Action.ACCOUNT)
 @respond_with(make_document_responder(NotificationsDocument.model_validate))
 def mark_notifications_read(

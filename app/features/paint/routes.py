@@ -186,20 +186,18 @@ class GroupProposals(ListDocument[GroupViewProposal]):
     """What was proposed for the views of a group, in their order."""
 
 
-@paint_router.get("", operation_id="listDatasetPaint", responses=responses(404))
+@paint_router.get("", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
-def list_paint_summaries(dataset: DatasetPath, store: AppStore) -> DatasetPaintDocument:
+def list_dataset_paint(dataset: DatasetPath, store: AppStore) -> DatasetPaintDocument:
     """How many pictures of each match were read for their paint, and what came of it."""
     return DatasetPaintDocument.model_validate(summarize_paint_readings(store, dataset))
 
 
-@paint_router.post(
-    "", operation_id="readDatasetPaint", **describe_job_response_for_openapi(404, 409, 413, 415)
-)
+@paint_router.post("", **describe_job_response_for_openapi(404, 409, 413, 415))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
-def request_paint_reading(
+def read_dataset_paint(
     dataset: DatasetPath, request: MatchSelection, services: AppServices, actor: Actor
 ) -> Job:
     """Read the paint of pictures and give it to their groups, which are solved again.
@@ -210,12 +208,10 @@ def request_paint_reading(
     return PAINT.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
-@paint_router.delete(
-    "", operation_id="revertDatasetPaint", **describe_job_response_for_openapi(404, 409)
-)
+@paint_router.delete("", **describe_job_response_for_openapi(404, 409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
-def take_back_paint(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
+def revert_dataset_paint(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Give all groups what they had before paint was read last; the job solves them.
 
     Once more takes back the reading before that one; 409 when there is none any more. A reading
@@ -225,14 +221,11 @@ def take_back_paint(dataset: DatasetPath, services: AppServices, actor: Actor) -
 
 
 @view_paint_router.post(
-    "/{view}/paint",
-    operation_id="readPaint",
-    response_model=PaintDocument,
-    responses=responses(*REFUSALS),
+    "/{view}/paint", response_model=PaintDocument, responses=responses(*REFUSALS)
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
 @limit(TRANSFER)
-async def read_view_paint(
+async def read_paint(
     view: Id, wanted: UnsavedLinesRequest, services: AppServices, request: Request
 ) -> PaintDocument | Response:
     """What the frame shows of the markings near a view's camera; saves nothing."""
@@ -246,10 +239,7 @@ async def read_view_paint(
 
 
 @view_paint_router.post(
-    "/{view}/propose",
-    operation_id="proposeLines",
-    response_model=ProposalDocument,
-    responses=responses(404, 413, 415, 503),
+    "/{view}/propose", response_model=ProposalDocument, responses=responses(404, 413, 415, 503)
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
 @limit(TRANSFER)
@@ -276,19 +266,16 @@ async def _wait_for_result(
         return await ask().result_unless_client_gone(request.is_disconnected)
 
 
-@proposals_router.get(
-    "/datasets/{dataset}/proposals", operation_id="listDatasetProposals", responses=responses(404)
-)
+@proposals_router.get("/datasets/{dataset}/proposals", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
-def list_proposal_counts(dataset: DatasetPath, store: AppStore) -> DatasetProposalCountsDocument:
+def list_dataset_proposals(dataset: DatasetPath, store: AppStore) -> DatasetProposalCountsDocument:
     """For how many views of each match something is proposed; nothing of it counts."""
     return DatasetProposalCountsDocument.model_validate(get_proposal_counts(store, dataset))
 
 
 @proposals_router.post(
     "/datasets/{dataset}/proposals",
-    operation_id="proposeDatasetLines",
     status_code=202,
     response_model=JobDocument,
     responses={
@@ -302,7 +289,7 @@ def list_proposal_counts(dataset: DatasetPath, store: AppStore) -> DatasetPropos
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
-def request_line_proposals(
+def propose_dataset_lines(
     dataset: DatasetPath,
     request: DatasetProposalsRequest,
     services: AppServices,
@@ -329,7 +316,6 @@ def _make_forgotten_response(gone: int) -> Response:
 
 @proposals_router.delete(
     "/datasets/{dataset}/proposals",
-    operation_id="forgetDatasetProposals",
     response_model=ForgottenProposalsDocument,
     responses=responses(404),
 )

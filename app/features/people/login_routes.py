@@ -42,7 +42,7 @@ OWN_PASSKEYS = "/session/passkeys"
 log = structlog.get_logger("touchline.access")
 
 
-@passkeys_router.get(OWN_PASSKEYS, operation_id="listPasskeys", responses=responses(401, 409))
+@passkeys_router.get(OWN_PASSKEYS, responses=responses(401, 409))
 @may(Action.ACCOUNT, to_enrol=True)
 @paged()
 def list_passkeys(request: Request, team: AppTeam, me: Me) -> PasskeyList:
@@ -57,11 +57,7 @@ def list_passkeys(request: Request, team: AppTeam, me: Me) -> PasskeyList:
     return PasskeyList(items=items, unavailable=unavailable)
 
 
-@passkeys_router.post(
-    f"{OWN_PASSKEYS}/begin",
-    operation_id="beginPasskey",
-    responses=responses(401, 409, 413, 415, 429),
-)
+@passkeys_router.post(f"{OWN_PASSKEYS}/begin", responses=responses(401, 409, 413, 415, 429))
 @may(Action.ACCOUNT, to_enrol=True)
 def begin_passkey(
     body: PasswordOnly, request: Request, team: AppTeam, me: Me
@@ -74,14 +70,9 @@ def begin_passkey(
     )
 
 
-@passkeys_router.post(
-    OWN_PASSKEYS,
-    operation_id="createPasskey",
-    status_code=201,
-    responses=responses(401, 409, 413, 415),
-)
+@passkeys_router.post(OWN_PASSKEYS, status_code=201, responses=responses(401, 409, 413, 415))
 @may(Action.ACCOUNT, to_enrol=True)
-def make_passkey(new: NewPasskey, request: Request, team: AppTeam, me: Me) -> PasskeyMade:
+def create_passkey(new: NewPasskey, request: Request, team: AppTeam, me: Me) -> PasskeyMade:
     """Keep a passkey that the browser has made; every other session ends. It is a second factor, too."""
     credential = new.credential.model_dump()
     made, codes = team.passkeys.make(me, new.name, credential, team.make_passkey_site(request))
@@ -90,12 +81,11 @@ def make_passkey(new: NewPasskey, request: Request, team: AppTeam, me: Me) -> Pa
 
 @passkeys_router.delete(
     f"{OWN_PASSKEYS}/{{passkey}}",
-    operation_id="deletePasskey",
     status_code=204,
     responses=responses(401, 404, 409, 413, 415, 429),
 )
 @may(Action.ACCOUNT)
-def remove_passkey(
+def delete_passkey(
     passkey: Id, body: PasswordOnly, request: Request, team: AppTeam, me: Me
 ) -> None:
     """Stop accepting a passkey; 409 for the last second factor, where everybody needs one."""
@@ -103,11 +93,7 @@ def remove_passkey(
     team.passkeys.remove(me, passkey, body.password)
 
 
-@passkeys_router.post(
-    "/session/passkey/begin",
-    operation_id="beginPasskeyLogin",
-    responses=responses(409, 413, 415, 429),
-)
+@passkeys_router.post("/session/passkey/begin", responses=responses(409, 413, 415, 429))
 @open_to_all
 def begin_passkey_login(
     request: Request, response: Response, team: AppTeam
@@ -121,13 +107,9 @@ def begin_passkey_login(
     return PasskeyRequestOptions(options=options)
 
 
-@passkeys_router.post(
-    "/session/passkey",
-    operation_id="createSessionWithPasskey",
-    responses=responses(401, 409, 413, 415, 429),
-)
+@passkeys_router.post("/session/passkey", responses=responses(401, 409, 413, 415, 429))
 @open_to_all
-def log_in_with_passkey(
+def create_session_with_passkey(
     body: PasskeyLogin, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:
     """Log in with a passkey: no name, no password, and no code."""
@@ -154,18 +136,14 @@ team_router = APIRouter(tags=["sessions"], route_class=Route)
 OWN_FACTOR = "/session/second-factor"
 
 
-@second_factors_router.get(
-    OWN_FACTOR, operation_id="getSecondFactor", responses=responses(401, 409)
-)
+@second_factors_router.get(OWN_FACTOR, responses=responses(401, 409))
 @may(Action.ACCOUNT, to_enrol=True)
 def get_second_factor(team: AppTeam, me: Me) -> FactorState:
     """Whether a code is asked for after one's password, and how many recovery codes are left."""
     return team.factors.state(me.person_id)
 
 
-@second_factors_router.post(
-    OWN_FACTOR, operation_id="beginSecondFactor", responses=responses(401, 409, 413, 415, 429)
-)
+@second_factors_router.post(OWN_FACTOR, responses=responses(401, 409, 413, 415, 429))
 @may(Action.ACCOUNT, to_enrol=True)
 def begin_second_factor(body: PasswordOnly, request: Request, team: AppTeam, me: Me) -> Enrolment:
     """What an authenticator has to know, shown this once; nothing is asked for before it is confirmed."""
@@ -174,9 +152,7 @@ def begin_second_factor(body: PasswordOnly, request: Request, team: AppTeam, me:
 
 
 @second_factors_router.post(
-    f"{OWN_FACTOR}/confirm",
-    operation_id="confirmSecondFactor",
-    responses=responses(401, 404, 409, 413, 415, 429),
+    f"{OWN_FACTOR}/confirm", responses=responses(401, 404, 409, 413, 415, 429)
 )
 @may(Action.ACCOUNT, to_enrol=True)
 def confirm_second_factor(body: CodeOnly, team: AppTeam, me: Me) -> RecoveryCodes:
@@ -186,40 +162,34 @@ def confirm_second_factor(body: CodeOnly, team: AppTeam, me: Me) -> RecoveryCode
 
 
 @second_factors_router.delete(
-    OWN_FACTOR,
-    operation_id="deleteSecondFactor",
-    status_code=204,
-    responses=responses(401, 409, 413, 415, 429),
+    OWN_FACTOR, status_code=204, responses=responses(401, 409, 413, 415, 429)
 )
 @may(Action.ACCOUNT, to_enrol=True)
-def remove_second_factor(body: PasswordOnly, request: Request, team: AppTeam, me: Me) -> None:
+def delete_second_factor(body: PasswordOnly, request: Request, team: AppTeam, me: Me) -> None:
     """Stop asking for a code; 409 where everybody needs a second factor."""
     team.count_login_attempt(request, me.name)
     team.factors.remove(me, body.password)
 
 
 @second_factors_router.delete(
-    "/users/{user}/second-factor",
-    operation_id="deleteSecondFactorOfUser",
-    status_code=204,
-    responses=responses(401, 404, 409),
+    "/users/{user}/second-factor", status_code=204, responses=responses(401, 404, 409)
 )
 @may(Action.ADMINISTER)
-def clear_second_factor(user: Id, team: AppTeam, me: Me) -> None:
+def delete_second_factor_of_user(user: Id, team: AppTeam, me: Me) -> None:
     """Take away the second factor of somebody who has lost it."""
     team.factors.clear(user, actor=me.actor)
 
 
-@team_router.get("/team", operation_id="getTeam", responses=responses(401, 409))
+@team_router.get("/team", responses=responses(401, 409))
 @may(Action.ADMINISTER)
-def get_team_settings(team: AppTeam, _me: Me) -> TeamSettings:
+def get_team(team: AppTeam, _me: Me) -> TeamSettings:
     """What counts for everybody."""
     return TeamSettings(require_second_factor=team.factors.required())
 
 
-@team_router.put("/team", operation_id="changeTeam", responses=responses(401, 409, 413, 415))
+@team_router.put("/team", responses=responses(401, 409, 413, 415))
 @may(Action.ADMINISTER)
-def put_team_settings(wanted: TeamSettings, team: AppTeam, me: Me) -> TeamSettings:
+def change_team(wanted: TeamSettings, team: AppTeam, me: Me) -> TeamSettings:
     """Let everybody need a second factor, or not; whoever has none makes one before anything else."""
     team.factors.set_required(wanted.require_second_factor, actor=me.actor)
     return wanted
@@ -228,7 +198,7 @@ def put_team_settings(wanted: TeamSettings, team: AppTeam, me: Me) -> TeamSettin
 tokens_router = APIRouter(prefix="/tokens", tags=["tokens"], route_class=UnstoredResponseRoute)
 
 
-@tokens_router.get("", operation_id="listTokens", responses=responses(401, 409))
+@tokens_router.get("", responses=responses(401, 409))
 @may(Action.ACCOUNT)
 @paged()
 def list_tokens(team: AppTeam, me: Me) -> AccessTokenList:
@@ -236,12 +206,7 @@ def list_tokens(team: AppTeam, me: Me) -> AccessTokenList:
     return AccessTokenList(items=team.tokens.list_of_person(me.person_id))
 
 
-@tokens_router.post(
-    "",
-    operation_id="makeToken",
-    status_code=201,
-    responses=responses(401, 404, 409, 413, 415),
-)
+@tokens_router.post("", status_code=201, responses=responses(401, 404, 409, 413, 415))
 @may(Action.ACCOUNT, body={"dataset": OwnedKind.DATASET})
 def make_token(new: NewAccessToken, store: AppStore, team: AppTeam, me: Me) -> MadeAccessToken:
     """Make a token for a script of one's own; its text is shown this once, and kept nowhere."""
@@ -250,9 +215,7 @@ def make_token(new: NewAccessToken, store: AppStore, team: AppTeam, me: Me) -> M
     return MadeAccessToken(token=AccessTokenDocument.model_validate(made), text=text)
 
 
-@tokens_router.delete(
-    "/{token}", operation_id="endToken", status_code=204, responses=responses(401, 404, 409)
-)
+@tokens_router.delete("/{token}", status_code=204, responses=responses(401, 404, 409))
 @may(Action.ACCOUNT)
 def end_token(token: Id, team: AppTeam, me: Me) -> None:
     """End a token of one's own: whatever uses it is refused from now on."""

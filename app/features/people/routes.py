@@ -50,7 +50,7 @@ def _user_with_link(person: Person, row: InvitationOutcome) -> UserWithLink:
     )
 
 
-@users_router.get("", operation_id="listUsers", responses=responses(401, 409))
+@users_router.get("", responses=responses(401, 409))
 @may(Action.ADMINISTER)
 @paged()
 def list_users(store: AppStore, team: AppTeam, _me: Me) -> UserList:
@@ -65,12 +65,7 @@ def _list_users(store: Store, team: TeamLogin) -> UserList:
     )
 
 
-@users_router.post(
-    "",
-    operation_id="inviteUser",
-    status_code=201,
-    responses=responses(401, 409, 413, 415),
-)
+@users_router.post("", status_code=201, responses=responses(401, 409, 413, 415))
 @may(Action.ADMINISTER)
 def invite_user(
     new: NewUser, request: Request, store: AppStore, team: AppTeam, me: Me
@@ -85,11 +80,7 @@ def invite_user(
     return _user_with_link(person, row)
 
 
-@users_router.post(
-    "/invitations",
-    operation_id="inviteUsers",
-    responses=responses(401, 409, 413, 415),
-)
+@users_router.post("/invitations", responses=responses(401, 409, 413, 415))
 @may(Action.ADMINISTER)
 def invite_users(
     wanted: InvitationList,
@@ -122,12 +113,7 @@ def _make_mailer(team: TeamLogin, request: Request) -> LinkMailer:
     return LinkMailer(team.mail, team.url, team.get_base_url(request))
 
 
-@users_router.patch(
-    "/{user}",
-    operation_id="changeUser",
-    response_model=Person,
-    responses=responses(401, 404, 409, 413, 415),
-)
+@users_router.patch("/{user}", response_model=Person, responses=responses(401, 404, 409, 413, 415))
 @may(Action.ADMINISTER)
 def change_user(user: Id, change: UserEdit, store: AppStore, _team: AppTeam, me: Me) -> Person:
     """Give somebody another role, disable or enable them; who is disabled is logged out.
@@ -139,13 +125,9 @@ def change_user(user: Id, change: UserEdit, store: AppStore, _team: AppTeam, me:
     )
 
 
-@users_router.post(
-    "/{user}/link",
-    operation_id="renewUserLink",
-    responses=responses(401, 404, 409, 413, 415),
-)
+@users_router.post("/{user}/link", responses=responses(401, 404, 409, 413, 415))
 @may(Action.ADMINISTER)
-def renew_link(
+def renew_user_link(
     user: Id,
     request: Request,
     store: AppStore,
@@ -164,13 +146,9 @@ def renew_link(
     )
 
 
-@users_router.post(
-    "/{user}/adoption",
-    operation_id="adoptLocalWork",
-    responses=responses(401, 404, 409),
-)
+@users_router.post("/{user}/adoption", responses=responses(401, 404, 409))
 @may(Action.ADMINISTER)
-def adopt_work(user: Id, store: AppStore, team: AppTeam, me: Me) -> UserList:
+def adopt_local_work(user: Id, store: AppStore, team: AppTeam, me: Me) -> UserList:
     """Show what was done before there were accounts, under the name `local`, as somebody's; once.
 
     The log is not changed: its entries keep their name, and this becomes an entry of its own.
@@ -179,25 +157,18 @@ def adopt_work(user: Id, store: AppStore, team: AppTeam, me: Me) -> UserList:
     return _list_users(store, team)
 
 
-@users_router.get(
-    "/{user}/tokens", operation_id="listTokensOfUser", responses=responses(401, 404, 409)
-)
+@users_router.get("/{user}/tokens", responses=responses(401, 404, 409))
 @may(Action.ADMINISTER)
 @paged()
-def list_tokens(user: Id, store: AppStore, team: AppTeam, _me: Me) -> AccessTokenList:
+def list_tokens_of_user(user: Id, store: AppStore, team: AppTeam, _me: Me) -> AccessTokenList:
     """The tokens with which somebody's scripts ask."""
     person = people.get_person(store, user)
     return AccessTokenList(items=team.tokens.list_of_person(person.id))
 
 
-@users_router.delete(
-    "/{user}/tokens/{token}",
-    operation_id="endTokenOfUser",
-    status_code=204,
-    responses=responses(401, 404, 409),
-)
+@users_router.delete("/{user}/tokens/{token}", status_code=204, responses=responses(401, 404, 409))
 @may(Action.ADMINISTER)
-def end_token(user: Id, token: Id, team: AppTeam, me: Me) -> None:
+def end_token_of_user(user: Id, token: Id, team: AppTeam, me: Me) -> None:
     """End a token of somebody: whatever uses it is refused from now on."""
     team.tokens.end(token, user, actor=me.actor)
 
@@ -205,7 +176,7 @@ def end_token(user: Id, token: Id, team: AppTeam, me: Me) -> None:
 members_router = APIRouter(prefix="/datasets/{dataset}/members", tags=["users"], route_class=Route)
 
 
-@members_router.get("", operation_id="listMembers", responses=responses(401, 404, 409))
+@members_router.get("", responses=responses(401, 404, 409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @paged()
 def list_members(dataset: DatasetPath, store: AppStore, _team: AppTeam, _me: Me) -> DatasetRoleList:
@@ -214,13 +185,10 @@ def list_members(dataset: DatasetPath, store: AppStore, _team: AppTeam, _me: Me)
 
 
 @members_router.put(
-    "/{user}",
-    operation_id="setMemberRole",
-    response_model=MemberDocument,
-    responses=responses(401, 404, 409, 413, 415),
+    "/{user}", response_model=MemberDocument, responses=responses(401, 404, 409, 413, 415)
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-def set_role(
+def set_member_role(
     dataset: DatasetPath, user: Id, change: MemberEdit, store: AppStore, _team: AppTeam, me: Me
 ) -> people.Member:
     """Give somebody a role in this dataset alone, up to lead; null takes it back.

@@ -92,7 +92,7 @@ def make_session_document(login: Login | None, store: Store) -> SessionDocument:
     )
 
 
-@router.get("/session", operation_id="getSession", responses=responses(401, 429))
+@router.get("/session", responses=responses(401, 429))
 @open_to_all
 def get_session(request: Request, services: AppServices) -> SessionDocument:
     """The person of the request, empty before the login. With a token: its owner and its scopes."""
@@ -120,10 +120,10 @@ def get_session(request: Request, services: AppServices) -> SessionDocument:
     return found.model_copy(update=more)
 
 
-@router.post("/session", operation_id="createSession", responses=responses(401, 409, 413, 415, 429))
+@router.post("/session", responses=responses(401, 409, 413, 415, 429))
 @open_to_all
 @limit(TRANSFER)
-def log_in(
+def create_session(
     who: LoginCredentials, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:
     """Log in; the answer sets the cookie of a new session.
@@ -181,10 +181,10 @@ def give_session(
     return make_session_document(login, store)
 
 
-@router.delete("/session", operation_id="deleteSession", responses=responses(409))
+@router.delete("/session", responses=responses(409))
 @open_to_all
 @limit(TRANSFER)
-def log_out(
+def delete_session(
     request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SessionDocument:
     """Log out: the session ends on the server, and the cookie goes."""
@@ -198,11 +198,7 @@ def log_out(
     return make_session_document(None, store)
 
 
-@router.put(
-    "/session/password",
-    operation_id="changePassword",
-    responses=responses(401, 409, 413, 415, 429),
-)
+@router.put("/session/password", responses=responses(401, 409, 413, 415, 429))
 @may(Action.ACCOUNT, to_enrol=True)
 @limit(TRANSFER)
 def change_password(
@@ -220,7 +216,7 @@ def change_password(
     return give_session(team, store, request, response, token)
 
 
-@router.get("/sessions", operation_id="listSessions", responses=responses(401, 409))
+@router.get("/sessions", responses=responses(401, 409))
 @may(Action.ACCOUNT)
 @paged()
 def list_sessions(team: AppTeam, me: Me) -> OpenSessionList:
@@ -232,38 +228,29 @@ def list_sessions(team: AppTeam, me: Me) -> OpenSessionList:
     return OpenSessionList(items=items)
 
 
-@router.delete(
-    "/sessions", operation_id="deleteOtherSessions", status_code=204, responses=responses(401, 409)
-)
+@router.delete("/sessions", status_code=204, responses=responses(401, 409))
 @may(Action.ACCOUNT)
-def end_other_sessions(team: AppTeam, me: Me) -> None:
+def delete_other_sessions(team: AppTeam, me: Me) -> None:
     """End every session of one's own but this one."""
     team.logins.end_others(me)
 
 
-@router.delete(
-    "/sessions/{session}",
-    operation_id="endSession",
-    status_code=204,
-    responses=responses(401, 404, 409),
-)
+@router.delete("/sessions/{session}", status_code=204, responses=responses(401, 404, 409))
 @may(Action.ACCOUNT)
 def end_session(session: Id, team: AppTeam, me: Me) -> None:
     """End a session of one's own."""
     team.logins.end(me, session)
 
 
-@router.post("/links/look", operation_id="readLink", responses=responses(404, 409, 413, 415, 429))
+@router.post("/links/look", responses=responses(404, 409, 413, 415, 429))
 @open_to_all
-def look_at_link(asked: LinkToken, request: Request, store: AppStore, team: AppTeam) -> LinkHolder:
+def read_link(asked: LinkToken, request: Request, store: AppStore, team: AppTeam) -> LinkHolder:
     """The person a link is for; 404 where it is no longer valid."""
     team.count_login_attempt(request)
     return LinkHolder(**vars(links.find_link_holder(store, asked.token)))
 
 
-@router.post(
-    "/links/use", operation_id="useLink", responses=responses(401, 404, 409, 413, 415, 429)
-)
+@router.post("/links/use", responses=responses(401, 404, 409, 413, 415, 429))
 @open_to_all
 @limit(TRANSFER)
 def use_link(
@@ -280,11 +267,7 @@ def use_link(
     return _begin_session(team, store, request, response, name, chosen.password)
 
 
-@sign_on_router.post(
-    "/session/sign-on/begin",
-    operation_id="beginSignOn",
-    responses=responses(404, 409, 413, 415, 429),
-)
+@sign_on_router.post("/session/sign-on/begin", responses=responses(404, 409, 413, 415, 429))
 @open_to_all
 @limit(TRANSFER)
 def begin_sign_on(
@@ -305,14 +288,10 @@ def begin_sign_on(
     return SignOnStarted(address=address)
 
 
-@sign_on_router.post(
-    "/session/sign-on",
-    operation_id="createSessionBySignOn",
-    responses=responses(401, 404, 409, 413, 415, 429),
-)
+@sign_on_router.post("/session/sign-on", responses=responses(401, 404, 409, 413, 415, 429))
 @open_to_all
 @limit(TRANSFER)
-def finish_sign_on(
+def create_session_by_sign_on(
     body: SignOnCallback, request: Request, response: Response, store: AppStore, team: AppTeam
 ) -> SignOnFinished:
     """Log in with what the provider has answered, or link the account where that was begun.
@@ -348,9 +327,9 @@ def finish_sign_on(
     )
 
 
-@sign_on_router.get("/session/identity", operation_id="getIdentity", responses=responses(401, 409))
+@sign_on_router.get("/session/identity", responses=responses(401, 409))
 @may(Action.ACCOUNT)
-def get_own_login_methods(store: AppStore, team: AppTeam, me: Me) -> OwnLoginMethods:
+def get_identity(store: AppStore, team: AppTeam, me: Me) -> OwnLoginMethods:
     """How one can come in: whether there is a password, and which account of the provider is one's own."""
     ways, rules = read_login_ways(store, me.person_id), team.sign_on and team.sign_on.rules
     return OwnLoginMethods(
@@ -361,14 +340,10 @@ def get_own_login_methods(store: AppStore, team: AppTeam, me: Me) -> OwnLoginMet
     )
 
 
-@sign_on_router.post(
-    "/session/identity/begin",
-    operation_id="beginIdentity",
-    responses=responses(401, 409, 413, 415, 429),
-)
+@sign_on_router.post("/session/identity/begin", responses=responses(401, 409, 413, 415, 429))
 @may(Action.ACCOUNT)
 @limit(TRANSFER)
-def begin_identity_link(
+def begin_identity(
     body: PasswordOnly, request: Request, response: Response, team: AppTeam, me: Me
 ) -> SignOnStarted:
     """Where to go to link an account of the provider with one's own; takes the password."""
@@ -383,13 +358,10 @@ def begin_identity_link(
 
 
 @sign_on_router.delete(
-    "/session/identity",
-    operation_id="deleteIdentity",
-    status_code=204,
-    responses=responses(401, 404, 409, 413, 415, 429),
+    "/session/identity", status_code=204, responses=responses(401, 404, 409, 413, 415, 429)
 )
 @may(Action.ACCOUNT)
-def remove_own_identity(
+def delete_identity(
     body: PasswordOnly, request: Request, store: AppStore, team: AppTeam, me: Me
 ) -> None:
     """Unlink one's account of the provider; 409 for whoever has no password. Takes the password."""
@@ -398,13 +370,9 @@ def remove_own_identity(
 
 
 @sign_on_router.delete(
-    "/users/{user}/identity",
-    operation_id="deleteIdentityOfUser",
-    status_code=204,
-    tags=["users"],
-    responses=responses(401, 404, 409),
+    "/users/{user}/identity", status_code=204, tags=["users"], responses=responses(401, 404, 409)
 )
 @may(Action.ADMINISTER)
-def remove_identity_of_user(user: Id, store: AppStore, _team: AppTeam, me: Me) -> None:
+def delete_identity_of_user(user: Id, store: AppStore, _team: AppTeam, me: Me) -> None:
     """Unlink somebody's account of the provider; their sessions that began with it end."""
     unlink_person(store, user, actor=me.actor)

@@ -123,7 +123,7 @@ class PitchChange(BaseModel):
     width: Annotated[float, Field(ge=WIDTH_RANGE[0], le=WIDTH_RANGE[1])]
 
 
-@pitch_router.get("/pitch", operation_id="getPitch", responses=responses())
+@pitch_router.get("/pitch", responses=responses())
 @may(Action.READ, where=RoleScope.SOMEWHERE)
 def get_pitch(
     length: Annotated[float, Query(ge=LENGTH_RANGE[0], le=LENGTH_RANGE[1])] = 105.0,
@@ -133,9 +133,7 @@ def get_pitch(
     return PitchDocument.of(Pitch(length, width))
 
 
-@pitches_router.get(
-    "", operation_id="listPitches", responses={**responses(404), 200: {"headers": TAGGED}}
-)
+@pitches_router.get("", responses={**responses(404), 200: {"headers": TAGGED}})
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_pitches(dataset: DatasetPath, store: AppStore, response: Response) -> PitchesDocument:
@@ -149,10 +147,10 @@ def list_pitches(dataset: DatasetPath, store: AppStore, response: Response) -> P
     return PitchesDocument.model_validate(state)
 
 
-@pitches_router.post("", operation_id="estimatePitches", **describe_job_response_for_openapi(404))
+@pitches_router.post("", **describe_job_response_for_openapi(404))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
-def request_pitch_estimation(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
+def estimate_pitches(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
     """Estimate the pitches of the matches whose lines were not looked at as they are now.
 
     The job solves what is stale, too: it is the one that follows an import.
@@ -173,7 +171,6 @@ def _make_pitch_job_response(sized: PitchesAndJob) -> Response:
 
 @pitches_router.patch(
     "",
-    operation_id="setPitch",
     status_code=202,
     response_model=JobDocument,
     responses={**responses(404, 412, 413, 415, 428), **CHANGED},

@@ -42,7 +42,7 @@ CHANGED: Responses = {
 }
 
 
-@router.get("/policies", operation_id="listPolicies", responses=responses())
+@router.get("/policies", responses=responses())
 @may(Action.READ, where=RoleScope.SOMEWHERE)
 @paged()
 def list_policies() -> PolicyCatalogue:
@@ -53,11 +53,7 @@ def list_policies() -> PolicyCatalogue:
     )
 
 
-@router.get(
-    "/datasets/{dataset}/policy",
-    operation_id="getPolicy",
-    responses={**responses(404), 200: {"headers": TAGGED}},
-)
+@router.get("/datasets/{dataset}/policy", responses={**responses(404), 200: {"headers": TAGGED}})
 @may(Action.READ, dataset=OwnedKind.DATASET)
 def get_policy(dataset: DatasetPath, store: AppStore, response: Response) -> PolicyStateDocument:
     """The policy of the dataset, and its earlier versions."""
@@ -76,14 +72,13 @@ def _make_policy_change_response(judged: PolicyStateAndJob) -> Response:
 
 @router.put(
     "/datasets/{dataset}/policy",
-    operation_id="setPolicy",
     status_code=202,
     response_model=JobDocument,
     responses={**responses(404, 412, 413, 415, 428), **CHANGED},
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(_make_policy_change_response)
-def put_policy(
+def set_policy(
     dataset: DatasetPath,
     change: PolicyChange,
     services: AppServices,

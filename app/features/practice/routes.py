@@ -109,12 +109,7 @@ async def _find_practice_person(request: Request) -> str | None:
 Person = Annotated[str | None, Depends(_find_practice_person)]
 
 
-@router.get(
-    "/practice",
-    operation_id="getPractice",
-    response_model=PracticeDocument,
-    responses=responses(),
-)
+@router.get("/practice", response_model=PracticeDocument, responses=responses())
 @may(Action.READ, where=RoleScope.SOMEWHERE)
 def get_practice(services: AppServices, visibility: Sees, person: Person) -> Practice:
     """Every lesson and what has come of it; none until the practice is made.
@@ -124,11 +119,7 @@ def get_practice(services: AppServices, visibility: Sees, person: Person) -> Pra
     return read_practice(services.store, services.settings, visibility, person)
 
 
-@router.post(
-    "/practice",
-    operation_id="startPractice",
-    **describe_job_response_for_openapi(409, 413, 415, 503),
-)
+@router.post("/practice", **describe_job_response_for_openapi(409, 413, 415, 503))
 @may(Action.ANNOTATE, where=RoleScope.OWN)
 @respond_with(make_job_response)
 def start_practice(
@@ -151,12 +142,7 @@ def start_practice(
     )
 
 
-@router.get(
-    "/practice/recording",
-    operation_id="getRecordingPractice",
-    response_model=RecordingPracticeDocument,
-    responses=responses(),
-)
+@router.get("/practice/recording", response_model=RecordingPracticeDocument, responses=responses())
 @may(Action.READ, where=RoleScope.SOMEWHERE)
 def get_recording_practice(
     services: AppServices, visibility: Sees, person: Person
@@ -165,11 +151,7 @@ def get_recording_practice(
     return read_recording_practice(services.store, services.settings, visibility, person)
 
 
-@router.post(
-    "/practice/recording",
-    operation_id="startRecordingPractice",
-    **describe_job_response_for_openapi(409, 413, 415, 503),
-)
+@router.post("/practice/recording", **describe_job_response_for_openapi(409, 413, 415, 503))
 @may(Action.ANNOTATE, where=RoleScope.OWN)
 @respond_with(make_job_response)
 def start_recording_practice(
@@ -192,12 +174,7 @@ def start_recording_practice(
     )
 
 
-@router.get(
-    "/groups/{group}/lesson",
-    operation_id="getLesson",
-    response_model=LessonDocument,
-    responses=responses(404),
-)
+@router.get("/groups/{group}/lesson", response_model=LessonDocument, responses=responses(404))
 @may(Action.READ, group=OwnedKind.GROUP)
 def get_lesson(group: Id, services: AppServices) -> PracticeLesson:
     """What a practice group asks, and whether it was answered rightly; 404 for other groups."""

@@ -231,9 +231,7 @@ TABLE_FILES = _describe_file_responses(
 )
 
 
-@router.get(
-    "/datasets/{dataset}/evaluations", operation_id="listEvaluations", responses=responses(404)
-)
+@router.get("/datasets/{dataset}/evaluations", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_evaluations(dataset: DatasetPath, store: AppStore) -> EvaluationList:
@@ -243,9 +241,7 @@ def list_evaluations(dataset: DatasetPath, store: AppStore) -> EvaluationList:
 
 
 @router.post(
-    "/datasets/{dataset}/evaluations",
-    operation_id="startEvaluation",
-    **describe_job_response_for_openapi(404, 409, 413, 415),
+    "/datasets/{dataset}/evaluations", **describe_job_response_for_openapi(404, 409, 413, 415)
 )
 @may(
     Action.LEAD,
@@ -267,10 +263,7 @@ def start_evaluation(
 
 
 @router.get(
-    "/evaluations/{evaluation}",
-    operation_id="getEvaluation",
-    response_model=EvaluationDocument,
-    responses=responses(404),
+    "/evaluations/{evaluation}", response_model=EvaluationDocument, responses=responses(404)
 )
 @may(Action.READ, evaluation=OwnedKind.EVALUATION)
 def get_evaluation(evaluation: Id, store: AppStore) -> review.StoredEvaluation:
@@ -278,12 +271,7 @@ def get_evaluation(evaluation: Id, store: AppStore) -> review.StoredEvaluation:
     return review.get_evaluation(store, evaluation)
 
 
-@router.delete(
-    "/evaluations/{evaluation}",
-    operation_id="deleteEvaluation",
-    status_code=204,
-    responses=responses(404),
-)
+@router.delete("/evaluations/{evaluation}", status_code=204, responses=responses(404))
 @may(Action.LEAD, evaluation=OwnedKind.EVALUATION)
 @respond_with(make_empty_response)
 def delete_evaluation(evaluation: Id, store: AppStore, actor: Actor) -> None:
@@ -293,7 +281,6 @@ def delete_evaluation(evaluation: Id, store: AppStore, actor: Actor) -> None:
 
 @router.get(
     "/evaluations/{evaluation}/figures/{figure}.{ending}",
-    operation_id="getFigure",
     response_class=Response,
     responses={**responses(404), **FIGURE_FILES},
 )
@@ -318,7 +305,6 @@ def get_figure(
 
 @router.get(
     "/evaluations/{evaluation}/tables/{table}.{ending}",
-    operation_id="getTable",
     response_class=Response,
     responses={**responses(404), **TABLE_FILES},
 )
@@ -341,14 +327,9 @@ def get_table(
     return _csv_response(table_to_csv(found), f"touchline-{evaluation}-{table}.csv")
 
 
-@router.get(
-    "/evaluations/{evaluation}/frames",
-    operation_id="listEvaluationFrames",
-    response_model=FrameList,
-    responses=responses(404),
-)
+@router.get("/evaluations/{evaluation}/frames", response_model=FrameList, responses=responses(404))
 @may(Action.READ, evaluation=OwnedKind.EVALUATION)
-def list_frames(
+def list_evaluation_frames(
     evaluation: Id,
     store: AppStore,
     field: Annotated[
@@ -371,11 +352,7 @@ def list_frames(
     return review.list_frames(store, evaluation, query, limit, parse_cursor(cursor) or 0)
 
 
-@router.get(
-    "/evaluations/{evaluation}/compare",
-    operation_id="compareEvaluations",
-    responses=responses(404),
-)
+@router.get("/evaluations/{evaluation}/compare", responses=responses(404))
 @may(Action.READ, evaluation=OwnedKind.EVALUATION, with_=OwnedKind.EVALUATION)
 def compare_evaluations(
     evaluation: Id,

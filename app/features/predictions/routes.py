@@ -47,9 +47,7 @@ router = APIRouter(tags=["predictions"], route_class=Route)
 LOCATION = {"Location": {"description": "Of the set.", "schema": {"type": "string"}}}
 
 
-@router.get(
-    "/datasets/{dataset}/predictions", operation_id="listPredictions", responses=responses(404)
-)
+@router.get("/datasets/{dataset}/predictions", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_predictions(dataset: DatasetPath, store: AppStore) -> PredictionSetList:
@@ -65,7 +63,6 @@ def _make_added_response(found: review.PredictionSet) -> Response:
 
 @router.post(
     "/datasets/{dataset}/predictions",
-    operation_id="addPredictions",
     response_model=PredictionSetDocument,
     status_code=201,
     responses={
@@ -112,7 +109,6 @@ def _make_accepted_response(found: AcceptReport | Job) -> Response:
 
 @router.post(
     "/predictions/accept",
-    operation_id="acceptPredictions",
     response_model=AcceptOutcome,
     responses={
         **responses(404, 409, 413, 415),
@@ -144,10 +140,7 @@ def accept_predictions(
 
 
 @router.get(
-    "/predictions/{predictions}",
-    operation_id="getPredictions",
-    response_model=PredictionSetDocument,
-    responses=responses(404),
+    "/predictions/{predictions}", response_model=PredictionSetDocument, responses=responses(404)
 )
 @may(Action.READ, predictions=OwnedKind.PREDICTIONS)
 def get_predictions(predictions: Id, store: AppStore) -> review.PredictionSet:
@@ -155,12 +148,7 @@ def get_predictions(predictions: Id, store: AppStore) -> review.PredictionSet:
     return review.get_predictions(store, predictions)
 
 
-@router.delete(
-    "/predictions/{predictions}",
-    operation_id="deletePredictions",
-    status_code=204,
-    responses=responses(404),
-)
+@router.delete("/predictions/{predictions}", status_code=204, responses=responses(404))
 @may(Action.LEAD, predictions=OwnedKind.PREDICTIONS)
 @respond_with(make_empty_response)
 def delete_predictions(predictions: Id, store: AppStore, actor: Actor) -> None:
@@ -168,9 +156,7 @@ def delete_predictions(predictions: Id, store: AppStore, actor: Actor) -> None:
     review.delete_predictions(store, predictions, actor=actor)
 
 
-@router.get(
-    "/views/{view}/predictions", operation_id="getViewPredictions", responses=responses(404)
-)
+@router.get("/views/{view}/predictions", responses=responses(404))
 @may(Action.READ, view=OwnedKind.VIEW)
 @paged()
 def get_view_predictions(view: Id, store: AppStore) -> ViewPredictions:
@@ -182,9 +168,7 @@ def get_view_predictions(view: Id, store: AppStore) -> ViewPredictions:
     )
 
 
-@router.get(
-    "/groups/{group}/predictions", operation_id="getGroupPredictions", responses=responses(404)
-)
+@router.get("/groups/{group}/predictions", responses=responses(404))
 @may(Action.READ, group=OwnedKind.GROUP)
 @paged()
 def get_group_predictions(group: Id, store: AppStore) -> GroupPredictionsDocument:
@@ -194,7 +178,6 @@ def get_group_predictions(group: Id, store: AppStore) -> GroupPredictionsDocumen
 
 @router.post(
     "/views/{view}/predictions/{prediction}/accept",
-    operation_id="acceptPrediction",
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )

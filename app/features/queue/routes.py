@@ -416,7 +416,7 @@ class MarkingInfluences(ListDocument[MarkingInfluenceDocument]):
     """The influence of every annotated marking of a view."""
 
 
-@query_fields_router.get("/query-fields", operation_id="listQueryFields", responses=responses())
+@query_fields_router.get("/query-fields", responses=responses())
 @may(Action.READ, where=RoleScope.SOMEWHERE)
 @paged()
 def list_query_fields() -> QueryFieldList:
@@ -424,12 +424,7 @@ def list_query_fields() -> QueryFieldList:
     return QueryFieldList(items=FIELDS, sorts=ORDERS)
 
 
-@statistics_router.get(
-    "",
-    operation_id="getStatistics",
-    response_model=StatisticsDocument,
-    responses=responses(404),
-)
+@statistics_router.get("", response_model=StatisticsDocument, responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET)
 def get_statistics(
     dataset: DatasetPath, services: AppServices, query: QueryText = ""
@@ -444,7 +439,7 @@ def get_statistics(
     return services.statistics.get_statistics(found)
 
 
-@timeline_router.get("", operation_id="getTimeline", responses=responses(404))
+@timeline_router.get("", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET)
 def get_timeline(
     dataset: DatasetPath, store: AppStore, query: QueryText = "", match: MatchName = None
@@ -453,9 +448,7 @@ def get_timeline(
     return TimelineDocument.of(read_timeline(store, dataset_id(store, dataset), query, match))
 
 
-@insight_router.get(
-    "/groups/{group}/suggestions", operation_id="getSuggestions", responses=responses(404)
-)
+@insight_router.get("/groups/{group}/suggestions", responses=responses(404))
 @may(Action.READ, group=OwnedKind.GROUP)
 @limit(COMPUTE)
 @paged()
@@ -468,9 +461,7 @@ def get_suggestions(group: Id, store: AppStore) -> GroupFixSuggestions:
     return GroupFixSuggestions(items=found)
 
 
-@insight_router.get(
-    "/views/{view}/influence", operation_id="getInfluence", responses=responses(404)
-)
+@insight_router.get("/views/{view}/influence", responses=responses(404))
 @may(Action.READ, view=OwnedKind.VIEW)
 @limit(COMPUTE)
 @paged()

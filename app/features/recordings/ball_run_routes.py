@@ -64,7 +64,6 @@ def get_runs(recording: Id, services: AppServices) -> BallRunList:
 
 @router.post(
     "",
-    operation_id="followBall",
     response_model=BallRunFrames,
     status_code=201,
     responses={
@@ -75,7 +74,7 @@ def get_runs(recording: Id, services: AppServices) -> BallRunList:
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
 @limit(COMPUTE)
 @respond_with(_make_created_response)
-def add_one(
+def follow_ball(
     recording: Id, wanted: BallClickRequest, services: AppServices, actor: Actor
 ) -> StoredRun:
     """Follow the ball from a click, forwards and backwards through the shot, until it is lost.
@@ -101,14 +100,13 @@ def get_one(recording: Id, run: RunId, store: AppStore) -> Response:
 
 @router.post(
     "/{run}/clicks",
-    operation_id="mendBallRun",
     response_model=BallRunFrames,
     responses={**responses(404, 409, 412, 413, 415, 428, 503), 200: TAGGED},
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
 @limit(COMPUTE)
 @respond_with(_make_run_response)
-def mend_one(
+def mend_ball_run(
     recording: Id,
     run: RunId,
     wanted: BallClickRequest,
@@ -126,13 +124,12 @@ def mend_one(
 
 @router.patch(
     "/{run}",
-    operation_id="changeBallRun",
     response_model=BallRunFrames,
     responses={**responses(404, 409, 412, 413, 415, 428), 200: TAGGED},
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
 @respond_with(_make_run_response)
-def change_one(
+def change_ball_run(
     recording: Id,
     run: RunId,
     wanted: BallRunReviewRequest,
@@ -157,13 +154,12 @@ def change_one(
 
 @router.delete(
     "/{run}",
-    operation_id="deleteBallRun",
     status_code=204,
     response_class=Response,
     responses={**responses(404), 204: {"description": "It is gone."}},
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
 @respond_with(make_empty_response)
-def delete_one(recording: Id, run: RunId, store: AppStore, actor: Actor) -> None:
+def delete_ball_run(recording: Id, run: RunId, store: AppStore, actor: Actor) -> None:
     """Delete a ball run; balls that views have from it stay."""
     remove_ball_run(store, recording, run, actor=actor)

@@ -56,20 +56,16 @@ FILE: Responses = {
 }
 
 
-@router.get("/{recording}/cameras", operation_id="listCameras", responses=responses(404))
+@router.get("/{recording}/cameras", responses=responses(404))
 @may(Action.READ, recording=OwnedKind.RECORDING)
 @paged()
-def get_stretches(recording: Id, store: AppStore) -> CamerasList:
+def list_cameras(recording: Id, store: AppStore) -> CamerasList:
     """The stretches of a recording that have a camera for each frame, and what became of their frames."""
     found = list_shot_cameras(store, recording)
     return CamerasList(items=[CamerasDocument.model_validate(one) for one in found])
 
 
-@router.post(
-    "/{recording}/cameras",
-    operation_id="trackCameras",
-    **describe_job_response_for_openapi(404, 409, 413, 415),
-)
+@router.post("/{recording}/cameras", **describe_job_response_for_openapi(404, 409, 413, 415))
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
 @respond_with(make_job_response)
 def track_cameras(
@@ -87,12 +83,11 @@ def track_cameras(
 
 @router.get(
     "/{recording}/cameras/{frame}",
-    operation_id="getCameras",
     response_model=FrameCamerasDocument,
     responses={**responses(404, 409), 200: TAGGED},
 )
 @may(Action.READ, recording=OwnedKind.RECORDING)
-def get_stretch(
+def get_cameras(
     recording: Id, frame: Frame, store: AppStore, request: Request, before: Before = False
 ) -> Response:
     """The camera of each frame of the stretch that has a frame."""
@@ -110,13 +105,11 @@ def get_stretch(
 
 
 @router.patch(
-    "/{recording}/cameras/{frame}",
-    operation_id="turnCameras",
-    **describe_job_response_for_openapi(404, 409, 413, 415),
+    "/{recording}/cameras/{frame}", **describe_job_response_for_openapi(404, 409, 413, 415)
 )
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
 @respond_with(make_job_response)
-def turn_stretch(
+def turn_cameras(
     recording: Id, frame: Frame, wanted: CamerasHalfTurnRequest, services: AppServices, actor: Actor
 ) -> Job:
     """Turn the cameras of the stretch that has a frame by half a turn of the pitch, or back.
@@ -131,7 +124,6 @@ def turn_stretch(
 
 @router.get(
     "/{recording}/cameras/{frame}/file",
-    operation_id="getCamerasFile",
     response_class=Response,
     responses={**responses(404, 409), **FILE},
 )

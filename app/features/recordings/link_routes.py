@@ -61,7 +61,6 @@ def get_links(recording: Id, store: AppStore) -> LinkList:
 
 @router.get(
     "/links.csv",
-    operation_id="getLinksFile",
     response_class=Response,
     responses={
         **responses(404),
@@ -106,10 +105,10 @@ def add_one(recording: Id, wanted: NewShotLink, store: AppStore, actor: Actor) -
     )
 
 
-@router.get("/links/suggestions/{frame}", operation_id="suggestLive", responses=responses(404, 409))
+@router.get("/links/suggestions/{frame}", responses=responses(404, 409))
 @may(Action.READ, recording=OwnedKind.RECORDING)
 @paged()
-def get_suggestions(recording: Id, frame: ReplayFrame, store: AppStore) -> LiveShotSuggestions:
+def suggest_live(recording: Id, frame: ReplayFrame, store: AppStore) -> LiveShotSuggestions:
     """Live shots that the replay at a frame may show, the likeliest first, and why."""
     return LiveShotSuggestions(items=suggest_live_shots(store, recording, frame))
 
@@ -123,9 +122,9 @@ def get_one(recording: Id, link: LinkId, store: AppStore, response: Response) ->
     return LinkDocument.model_validate(found)
 
 
-@router.get("/links/{link}/frames", operation_id="getLinkedFrames", responses=responses(404, 409))
+@router.get("/links/{link}/frames", responses=responses(404, 409))
 @may(Action.READ, recording=OwnedKind.RECORDING)
-def get_frames(recording: Id, link: LinkId, store: AppStore) -> LinkedFrames:
+def get_linked_frames(recording: Id, link: LinkId, store: AppStore) -> LinkedFrames:
     """Which frame of the replay shows the same as each live frame."""
     return find_linked_frames(store, get_link(store, recording, link))
 
@@ -165,11 +164,7 @@ def put_instants(
         )
 
 
-@router.post(
-    "/links/{link}/ball",
-    operation_id="linkByBall",
-    **describe_job_response_for_openapi(404, 413, 415),
-)
+@router.post("/links/{link}/ball", **describe_job_response_for_openapi(404, 413, 415))
 @may(
     Action.LEAD,
     recording=OwnedKind.RECORDING,
@@ -191,13 +186,12 @@ def link_by_ball(
 
 @router.delete(
     "/links/{link}",
-    operation_id="deleteLink",
     status_code=204,
     response_class=Response,
     responses={**responses(404), 204: {"description": "It is gone."}},
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
 @respond_with(make_empty_response)
-def delete_one(recording: Id, link: LinkId, store: AppStore, actor: Actor) -> None:
+def delete_link(recording: Id, link: LinkId, store: AppStore, actor: Actor) -> None:
     """Remove a link and its instants; groups that were taken of it stay."""
     remove_link(store, recording, link, actor=actor)

@@ -93,9 +93,7 @@ def get_recordings(store: AppStore, sight: SeesWhole, dataset: OfDataset = None)
     return RecordingList(items=[one for one in found if sight.sees(one.dataset_id)])
 
 
-@router.post(
-    "", operation_id="addRecording", **describe_job_response_for_openapi(404, 413, 415, 503)
-)
+@router.post("", **describe_job_response_for_openapi(404, 413, 415, 503))
 @may(
     Action.LEAD,
     body={
@@ -132,15 +130,12 @@ def get_one(recording: Id, store: AppStore) -> Recording:
     return get_recording(store, recording)
 
 
-@router.patch(
-    "/{recording}",
-    operation_id="changeRecording",
-    response_model=RecordingDocument,
-    responses=responses(404, 413, 415),
-)
+@router.patch("/{recording}", response_model=RecordingDocument, responses=responses(404, 413, 415))
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
 @respond_with(make_document_responder(RecordingDocument.model_validate))
-def change_one(recording: Id, wanted: RecordingChange, store: AppStore, actor: Actor) -> Recording:
+def change_recording(
+    recording: Id, wanted: RecordingChange, store: AppStore, actor: Actor
+) -> Recording:
     """Say what the clock of the match shows in frames of a recording; others follow from them.
 
     Groups that are taken afterwards have `match_half` and `match_seconds` in `metadata.recording`.
@@ -150,27 +145,25 @@ def change_one(recording: Id, wanted: RecordingChange, store: AppStore, actor: A
 
 @router.delete(
     "/{recording}",
-    operation_id="deleteRecording",
     status_code=204,
     response_class=Response,
     responses={**responses(404), 204: {"description": "It is gone."}},
 )
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
 @respond_with(make_empty_response)
-def delete_one(recording: Id, store: AppStore, actor: Actor) -> None:
+def delete_recording(recording: Id, store: AppStore, actor: Actor) -> None:
     """Forget a recording and its shots; its file stays, and so do the groups made of it."""
     remove_recording(store, recording, actor=actor)
 
 
 @router.get(
     "/{recording}/frames/{frame}",
-    operation_id="getRecordingFrame",
     response_class=Response,
     responses={**responses(404, 409, 413, 503), **FRAME},
 )
 @may(Action.READ, recording=OwnedKind.RECORDING)
 @limit(TRANSFER)
-async def get_frame(
+async def get_recording_frame(
     recording: Id,
     frame: Frame,
     services: AppServices,
@@ -200,11 +193,7 @@ def _make_shots_response(found: RecordingShots) -> Response:
     return make_document_response(ShotList.of(found), 200, {"ETag": found.etag})
 
 
-@router.get(
-    "/{recording}/shots",
-    operation_id="listShots",
-    responses={**responses(404, 409), 200: TAGGED},
-)
+@router.get("/{recording}/shots", responses={**responses(404, 409), 200: TAGGED})
 @may(Action.READ, recording=OwnedKind.RECORDING)
 @paged()
 def list_shots(recording: Id, store: AppStore, response: Response) -> ShotList:
@@ -216,7 +205,6 @@ def list_shots(recording: Id, store: AppStore, response: Response) -> ShotList:
 
 @router.get(
     "/{recording}/shots.csv",
-    operation_id="getShotsFile",
     response_class=Response,
     responses={
         **responses(404, 409),
@@ -234,7 +222,6 @@ def get_shots_file(recording: Id, store: AppStore) -> Response:
 
 @router.put(
     "/{recording}/shots",
-    operation_id="setShots",
     response_model=ShotList,
     responses={**responses(404, 409, 412, 413, 415, 428), 200: TAGGED},
 )
@@ -248,12 +235,10 @@ def set_shots(
         return replace_shots(store, recording, wanted.to_shots(), if_match, actor=actor)
 
 
-@router.post(
-    "/{recording}/shots", operation_id="findShots", **describe_job_response_for_openapi(404)
-)
+@router.post("/{recording}/shots", **describe_job_response_for_openapi(404))
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
 @respond_with(make_job_response)
-def detect_shots_again(recording: Id, services: AppServices, actor: Actor) -> Job:
+def find_shots(recording: Id, services: AppServices, actor: Actor) -> Job:
     """Find the shots of a recording anew, in place of the list that it has.
 
     A file that has changed, or whose index is gone or of an older version, is indexed again; the list stays if it is the
@@ -263,14 +248,10 @@ def detect_shots_again(recording: Id, services: AppServices, actor: Actor) -> Jo
     return request_index(services.jobs, services.store, found, shots=True, actor=actor)
 
 
-@router.post(
-    "/{recording}/groups",
-    operation_id="takeInstants",
-    **describe_job_response_for_openapi(404, 409, 413, 415),
-)
+@router.post("/{recording}/groups", **describe_job_response_for_openapi(404, 409, 413, 415))
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
 @respond_with(make_job_response)
-def make_groups_of_instants(
+def take_instants(
     recording: Id,
     wanted: InstantsRequest,
     services: AppServices,

@@ -43,9 +43,7 @@ class ReviewerList(ListDocument[Reviewer]):
     """Everybody who has judged a group, the most active first."""
 
 
-@router.get(
-    "/datasets/{dataset}/saved-views", operation_id="listSavedViews", responses=responses(404)
-)
+@router.get("/datasets/{dataset}/saved-views", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET)
 @paged()
 def list_saved_views(dataset: DatasetPath, store: AppStore) -> SavedViewList:
@@ -61,7 +59,6 @@ def _saved_view_response(view: SavedView) -> Response:
 
 @router.post(
     "/datasets/{dataset}/saved-views",
-    operation_id="createSavedView",
     response_model=SavedView,
     status_code=201,
     responses={
@@ -74,29 +71,22 @@ def _saved_view_response(view: SavedView) -> Response:
 )
 @may(Action.ANNOTATE, dataset=OwnedKind.DATASET)
 @respond_with(_saved_view_response)
-def save_view(dataset: DatasetPath, view: NewSavedView, store: AppStore, actor: Actor) -> SavedView:
+def create_saved_view(
+    dataset: DatasetPath, view: NewSavedView, store: AppStore, actor: Actor
+) -> SavedView:
     """Keep a query under a name; 409 when the name is taken."""
     values = view.model_dump()
     return saved_views.save_view(store, dataset_id(store, dataset), **values, actor=actor)
 
 
-@router.get(
-    "/saved-views/{view}",
-    operation_id="getSavedView",
-    responses=responses(404),
-)
+@router.get("/saved-views/{view}", responses=responses(404))
 @may(Action.READ, view=OwnedKind.SAVED_VIEW)
 def get_saved_view(view: Id, store: AppStore) -> SavedView:
     """One saved view."""
     return saved_views.read_saved_view(store, view)
 
 
-@router.delete(
-    "/saved-views/{view}",
-    operation_id="deleteSavedView",
-    response_model=SavedView,
-    responses=responses(404),
-)
+@router.delete("/saved-views/{view}", response_model=SavedView, responses=responses(404))
 @may(Action.ANNOTATE, view=OwnedKind.SAVED_VIEW)
 @respond_with(make_document_response)
 def delete_saved_view(view: Id, store: AppStore) -> SavedView:
@@ -104,7 +94,7 @@ def delete_saved_view(view: Id, store: AppStore) -> SavedView:
     return saved_views.remove_saved_view(store, view)
 
 
-@router.get("/datasets/{dataset}/reviewers", operation_id="listReviewers", responses=responses(404))
+@router.get("/datasets/{dataset}/reviewers", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET)
 @paged()
 def list_reviewers(dataset: DatasetPath, store: AppStore) -> ReviewerList:

@@ -100,7 +100,6 @@ class StationDetail(BaseModel):
 
 @router.get(
     "/{station}",
-    operation_id="getStation",
     responses={
         **responses(404),
         200: {"headers": {"ETag": {"description": "The station's.", "schema": {"type": "string"}}}},
@@ -114,15 +113,10 @@ def get_station(station: Id, store: AppStore, response: Response) -> StationDeta
     return StationDetail.of(state)
 
 
-@router.patch(
-    "/{station}/lines",
-    operation_id="setStationLines",
-    response_model=GroupDocument,
-    responses=STATION_CHANGED,
-)
+@router.patch("/{station}/lines", response_model=GroupDocument, responses=STATION_CHANGED)
 @may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
 @respond_with(make_group_response)
-def patch_lines(
+def set_station_lines(
     station: Id,
     lines: LinesEdit,
     services: AppServices,
@@ -139,15 +133,10 @@ def patch_lines(
     return _change_station(services, station, group, change, if_match, actor)
 
 
-@router.patch(
-    "/{station}",
-    operation_id="changeStation",
-    response_model=GroupDocument,
-    responses=STATION_CHANGED,
-)
+@router.patch("/{station}", response_model=GroupDocument, responses=STATION_CHANGED)
 @may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
 @respond_with(make_group_response)
-def patch_station(
+def change_station(
     station: Id,
     change: StationCalibrationSourceEdit,
     services: AppServices,

@@ -129,7 +129,6 @@ _SAME = (
 
 @router.post(
     "/{view}/ball/follow",
-    operation_id="followBallOfView",
     response_model=FollowedBallDocument,
     responses=responses(404, 409, 413, 415, 503),
 )

@@ -37,7 +37,7 @@ TAGGED = {"headers": {"ETag": {"description": "Of the track.", "schema": {"type"
 router = APIRouter(tags=["tracks"], route_class=Route)
 
 
-@router.get("/datasets/{dataset}/tracks", operation_id="listTracks", responses=responses(404))
+@router.get("/datasets/{dataset}/tracks", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @limit(COMPUTE)
 @paged()
@@ -71,11 +71,7 @@ def list_tracks(
     return TrackList.of(choose_tracks(store, dataset, choice))
 
 
-@router.post(
-    "/datasets/{dataset}/tracks",
-    operation_id="makeTracks",
-    **describe_job_response_for_openapi(404, 409, 413, 415),
-)
+@router.post("/datasets/{dataset}/tracks", **describe_job_response_for_openapi(404, 409, 413, 415))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def make_tracks(
@@ -88,7 +84,7 @@ def make_tracks(
     return TRACKS.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
-@router.get("/tracks/{track}", operation_id="getTrack", responses={**responses(404), 200: TAGGED})
+@router.get("/tracks/{track}", responses={**responses(404), 200: TAGGED})
 @may(Action.READ, track=OwnedKind.TRACK)
 def get_track(track: Id, store: AppStore, response: Response) -> TrackDocument:
     """A track without its frames."""
@@ -97,11 +93,7 @@ def get_track(track: Id, store: AppStore, response: Response) -> TrackDocument:
     return found
 
 
-@router.get(
-    "/tracks/{track}/frames",
-    operation_id="getTrackFrames",
-    responses={**responses(404), 200: TAGGED},
-)
+@router.get("/tracks/{track}/frames", responses={**responses(404), 200: TAGGED})
 @may(Action.READ, track=OwnedKind.TRACK)
 @limit(COMPUTE)
 def get_track_frames(
@@ -125,7 +117,7 @@ def get_track_frames(
     return found
 
 
-@router.get("/tracks/{track}/around", operation_id="getTrackAround", responses=responses(404))
+@router.get("/tracks/{track}/around", responses=responses(404))
 @may(Action.READ, track=OwnedKind.TRACK)
 @limit(COMPUTE)
 def get_track_around(
@@ -143,7 +135,7 @@ def get_track_around(
     return TrackExcerptDocument.of_excerpt(compute_track_excerpt(store, track, frame))
 
 
-@router.get("/groups/{group}/tracks", operation_id="listTracksOfGroup", responses=responses(404))
+@router.get("/groups/{group}/tracks", responses=responses(404))
 @may(Action.READ, group=OwnedKind.GROUP)
 @paged()
 def list_tracks_of_group(group: Id, store: AppStore) -> GroupTrackList:
@@ -158,7 +150,6 @@ def _make_track_response(track: Track) -> Response:
 
 @router.patch(
     "/tracks/{track}",
-    operation_id="changeTrack",
     response_model=TrackDocument,
     responses={**responses(404, 409, 412, 413, 415, 428), 200: TAGGED},
 )

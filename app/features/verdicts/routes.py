@@ -228,13 +228,12 @@ def put_verdict(
 @router.put(
     "/groups/{group}/dismissal",
     tags=["groups"],
-    operation_id="dismissFinding",
     response_model=GroupDocument,
     responses={**responses(*CONFLICTS), **CHANGED},
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
 @respond_with(make_group_response)
-def put_dismissal(
+def dismiss_finding(
     group: Id, body: DismissalEdit, services: AppServices, actor: Actor, if_match: IfMatch
 ) -> GroupState:
     """Say that a finding was checked and is fine, or that it is to be looked at again.
@@ -259,13 +258,12 @@ def put_dismissal(
 @router.post(
     "/datasets/{dataset}/verdicts",
     tags=["verdicts"],
-    operation_id="setVerdicts",
     response_model=BulkResult,
     responses=responses(404, 409, 413, 415),
 )
 @may(Action.REVIEW, dataset=OwnedKind.DATASET)
 @respond_with(make_document_responder(BulkResult.of_report))
-def post_verdicts(
+def set_verdicts(
     dataset: DatasetPath,
     verdict: BulkVerdict,
     store: AppStore,
@@ -285,14 +283,9 @@ def post_verdicts(
     return bulk.give_verdicts(store, found, *values, actor=actor, expected=verdict.expected)
 
 
-@router.get(
-    "/datasets/{dataset}/verdict-batches",
-    tags=["verdicts"],
-    operation_id="listVerdictBatches",
-    responses=responses(404),
-)
+@router.get("/datasets/{dataset}/verdict-batches", tags=["verdicts"], responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
-def list_bulk_verdicts(
+def list_verdict_batches(
     dataset: DatasetPath,
     store: AppStore,
     limit: Annotated[int, Query(ge=1, le=MAX_ITEMS, description="Items a page.")] = 20,
@@ -308,13 +301,12 @@ def list_bulk_verdicts(
 @router.post(
     "/verdict-batches/{batch}/redo",
     tags=["verdicts"],
-    operation_id="redoVerdictBatch",
     response_model=RedoReport,
     responses=responses(404, 409),
 )
 @may(Action.REVIEW, batch=OwnedKind.BATCH)
 @respond_with(make_document_response)
-def redo_bulk_verdict(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.RedoReport:
+def redo_verdict_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.RedoReport:
     """Give the verdicts of a batch again that was taken back, as a new batch.
 
     Groups that somebody has judged or edited since stay as they are. 409 when the batch was not
@@ -326,13 +318,12 @@ def redo_bulk_verdict(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.Red
 @router.post(
     "/verdict-batches/{batch}/undo",
     tags=["verdicts"],
-    operation_id="undoVerdictBatch",
     response_model=UndoReport,
     responses=responses(404, 409),
 )
 @may(Action.REVIEW, batch=OwnedKind.BATCH)
 @respond_with(make_document_response)
-def undo_bulk_verdict(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.UndoReport:
+def undo_verdict_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.UndoReport:
     """Give each group of a batch the verdict back that it had before; 409 the second time.
 
     Groups that somebody has judged since keep that verdict.

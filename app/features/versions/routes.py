@@ -261,7 +261,7 @@ def find_version_id_of_path(
 VersionPath = Annotated[int, Depends(find_version_id_of_path)]
 
 
-@router.get("/datasets/{dataset}/versions", operation_id="listVersions", responses=responses(404))
+@router.get("/datasets/{dataset}/versions", responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_versions(dataset: DatasetPath, store: AppStore) -> VersionList:
@@ -272,7 +272,6 @@ def list_versions(dataset: DatasetPath, store: AppStore) -> VersionList:
 
 @router.post(
     "/datasets/{dataset}/versions",
-    operation_id="freezeVersion",
     status_code=202,
     response_model=JobDocument,
     responses={
@@ -303,28 +302,21 @@ def freeze_version(
     )
 
 
-@router.get(
-    "/versions/{version}",
-    operation_id="getVersion",
-    response_model=VersionDocument,
-    responses=responses(404),
-)
+@router.get("/versions/{version}", response_model=VersionDocument, responses=responses(404))
 @may(Action.READ, version=OwnedKind.VERSION, dataset=OwnedKind.DATASET)
 def get_version(version: VersionPath, store: AppStore) -> versions.Version:
     """One version."""
     return versions.get_version(store, version)
 
 
-@router.get(
-    "/versions/{version}/manifest", operation_id="getVersionManifest", responses=responses(404)
-)
+@router.get("/versions/{version}/manifest", responses=responses(404))
 @may(Action.READ, version=OwnedKind.VERSION, dataset=OwnedKind.DATASET)
-def get_manifest(version: VersionPath, store: AppStore) -> VersionManifest:
+def get_version_manifest(version: VersionPath, store: AppStore) -> VersionManifest:
     """What a version says of itself: counts, settings, licence, overrides, changelog."""
     return VersionManifest.model_validate(make_version_manifest(store, version))
 
 
-@router.get("/versions/{version}/changelog", operation_id="getChangelog", responses=responses(404))
+@router.get("/versions/{version}/changelog", responses=responses(404))
 @may(Action.READ, version=OwnedKind.VERSION, dataset=OwnedKind.DATASET)
 def get_changelog(version: VersionPath, store: AppStore) -> Changelog:
     """What changed since the version before, in sentences."""
@@ -352,11 +344,7 @@ def get_diff(
     return VersionDiffDocument.model_validate(diff_versions(store, older, version).to_values(limit))
 
 
-@router.post(
-    "/versions/{version}/verify",
-    operation_id="verifyVersion",
-    **describe_job_response_for_openapi(404),
-)
+@router.post("/versions/{version}/verify", **describe_job_response_for_openapi(404))
 @may(Action.LEAD, version=OwnedKind.VERSION, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def verify_version(version: VersionPath, services: AppServices, actor: Actor) -> Job:

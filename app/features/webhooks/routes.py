@@ -78,7 +78,7 @@ def _webhook_with_secret(made: tuple[Webhook, str]) -> WebhookWithSecret:
     return WebhookWithSecret(webhook=webhook, secret=secret)
 
 
-@router.get("", operation_id="listWebhooks", responses=responses(404, 409))
+@router.get("", responses=responses(404, 409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @paged()
 def list_webhooks(dataset: DatasetPath, store: AppStore) -> WebhookList:
@@ -87,12 +87,7 @@ def list_webhooks(dataset: DatasetPath, store: AppStore) -> WebhookList:
     return WebhookList(items=items, allowed=store.settings.webhooks, kinds=list(CHOSEN))
 
 
-@router.post(
-    "",
-    operation_id="makeWebhook",
-    status_code=201,
-    responses=responses(404, 409, 413, 415),
-)
+@router.post("", status_code=201, responses=responses(404, 409, 413, 415))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def make_webhook(
     dataset: DatasetPath, new: NewWebhook, store: AppStore, actor: Actor
@@ -103,12 +98,7 @@ def make_webhook(
     )
 
 
-@router.patch(
-    "/{webhook}",
-    operation_id="changeWebhook",
-    response_model=Webhook,
-    responses=responses(404, 409, 413, 415),
-)
+@router.patch("/{webhook}", response_model=Webhook, responses=responses(404, 409, 413, 415))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def change_webhook(
     dataset: DatasetPath, webhook: Id, change: WebhookEdit, store: AppStore, actor: Actor
@@ -119,18 +109,16 @@ def change_webhook(
     )
 
 
-@router.delete(
-    "/{webhook}", operation_id="deleteWebhook", status_code=204, responses=responses(404, 409)
-)
+@router.delete("/{webhook}", status_code=204, responses=responses(404, 409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def delete_webhook(dataset: DatasetPath, webhook: Id, store: AppStore, actor: Actor) -> None:
     """Tell an address nothing more, and forget what it was told."""
     webhooks.remove_webhook(store, dataset, webhook, actor=actor)
 
 
-@router.post("/{webhook}/secret", operation_id="renewWebhookSecret", responses=responses(404, 409))
+@router.post("/{webhook}/secret", responses=responses(404, 409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-def renew_secret(
+def renew_webhook_secret(
     dataset: DatasetPath, webhook: Id, store: AppStore, actor: Actor
 ) -> WebhookWithSecret:
     """Another secret; what is sent from now on is signed with it."""
@@ -138,11 +126,7 @@ def renew_secret(
 
 
 @router.post(
-    "/{webhook}/ping",
-    operation_id="pingWebhook",
-    status_code=201,
-    response_model=Delivery,
-    responses=responses(404, 409),
+    "/{webhook}/ping", status_code=201, response_model=Delivery, responses=responses(404, 409)
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def ping_webhook(dataset: DatasetPath, webhook: Id, store: AppStore, actor: Actor) -> Delivery:
@@ -150,11 +134,9 @@ def ping_webhook(dataset: DatasetPath, webhook: Id, store: AppStore, actor: Acto
     return webhooks.send_ping(store, dataset, webhook, actor=actor)
 
 
-@router.get(
-    "/{webhook}/deliveries", operation_id="listWebhookDeliveries", responses=responses(404, 409)
-)
+@router.get("/{webhook}/deliveries", responses=responses(404, 409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-def list_deliveries(
+def list_webhook_deliveries(
     dataset: DatasetPath,
     webhook: Id,
     store: AppStore,
@@ -170,12 +152,11 @@ def list_deliveries(
 
 
 @router.post(
-    "/{webhook}/deliveries/{delivery}",
-    operation_id="sendWebhookDeliveryAgain",
-    response_model=Delivery,
-    responses=responses(404, 409),
+    "/{webhook}/deliveries/{delivery}", response_model=Delivery, responses=responses(404, 409)
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
-def send_again(dataset: DatasetPath, webhook: Id, delivery: Id, store: AppStore) -> Delivery:
+def send_webhook_delivery_again(
+    dataset: DatasetPath, webhook: Id, delivery: Id, store: AppStore
+) -> Delivery:
     """Send a message once more, at once."""
     return webhooks.resend_delivery(store, dataset, webhook, delivery)

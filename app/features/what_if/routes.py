@@ -180,10 +180,10 @@ class YieldDocument(Document):
     )
 
 
-@router.get("", operation_id="getYield", response_model=YieldDocument, responses=responses(404))
+@router.get("", response_model=YieldDocument, responses=responses(404))
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @limit(COMPUTE)
-def read_yield(dataset: DatasetPath, services: AppServices) -> Yield:
+def get_yield(dataset: DatasetPath, services: AppServices) -> Yield:
     """The yield of the policy: funnel, curves, splits, distances, leakage.
 
     What the answer is counted from is kept and follows every change. Where more than twenty
@@ -194,9 +194,7 @@ def read_yield(dataset: DatasetPath, services: AppServices) -> Yield:
     return count_yield(services.yields, found)
 
 
-@router.post(
-    "", operation_id="tryPolicy", response_model=YieldDocument, responses=responses(404, 413, 415)
-)
+@router.post("", response_model=YieldDocument, responses=responses(404, 413, 415))
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @limit(COMPUTE)
 def try_policy(dataset: DatasetPath, values: ThresholdsToTry, services: AppServices) -> Yield:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,6 +13,8 @@ from app.http.property_descriptions import PARAMETERS, PROPERTIES
 from app.http.route import list_routes
 
 Document = dict[str, Any]
+NAMES = Path(__file__).parent / "operation_ids.txt"
+"""A line for each operation: its method, its address and its name."""
 
 
 @pytest.fixture
@@ -45,6 +48,10 @@ class TestDocument:
         assert len(set(names)) == len(names)
         # A verb alone says nothing in a generated client.
         assert [name for name in names if name.islower()] == []
+
+    def test_keeps_the_names_of_operations_that_clients_were_made_with(self, document) -> None:
+        names = [f"{name} {one['operationId']}" for name, one in operations(document)]
+        assert sorted(names) == NAMES.read_text().splitlines()
 
     def test_describes_an_edit_of_the_ball_as_one_of_three_things(self, document) -> None:
         edit = document["components"]["schemas"]["BallEdit"]

@@ -18,7 +18,7 @@ from app.features.groups.view_routes import (
     CLIENT_GONE,
     MAX_WIDTH,
     MIN_WIDTH,
-    get_neighbour_frames,
+    get_frames_around,
     round_up_and_clamp_width,
 )
 from app.features.imports.ingest import import_groups
@@ -353,7 +353,7 @@ class TestImage:
                 return True
 
         async def ask() -> int:
-            answer = await get_neighbour_frames(view, app.state.services, Gone())
+            answer = await get_frames_around(view, app.state.services, Gone())
             return answer.status_code
 
         assert asyncio.run(asyncio.wait_for(ask(), 20)) == CLIENT_GONE
