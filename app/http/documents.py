@@ -46,6 +46,18 @@ class Document(BaseModel):
             cls.__annotations__ = shown | get_annotations(cls)
 
 
+class RequestBody(BaseModel, extra="forbid"):
+    """The body of a request, or a part of one: a field that it does not know is an error.
+
+    Its ``examples``, if it has any, stand in its schema.
+    """
+
+    def __init_subclass__(cls, examples: list[Any] | None = None, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if examples is not None:
+            cls.model_config["json_schema_extra"] = {"examples": examples}
+
+
 def encode_document(value: Any) -> bytes:
     """The JSON of a document, or of a frozen dataclass, which is its own; no number is infinite or NaN."""
     kind: Any = type(value)

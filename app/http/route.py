@@ -101,7 +101,7 @@ class Route(APIRoute):
         if self.permission.action is not None and (access := gate.access) is not None:
             login = await access.authenticate(request.scope)
         try:
-            body = RequestBody()
+            body = ReadBody()
             if request.method not in SAFE_METHODS:
                 body = await self._read_request_body(gate, request)
             if access is None or login is None:
@@ -116,7 +116,7 @@ class Route(APIRoute):
         login: Login,
         gate: RequestPipeline,
         request: Request,
-        body: RequestBody,
+        body: ReadBody,
         handler: Handler,
     ) -> Response:
         """The answer to somebody, if they may have it."""
@@ -145,7 +145,7 @@ class Route(APIRoute):
         self,
         gate: RequestPipeline,
         request: Request,
-        body: RequestBody,
+        body: ReadBody,
         handler: Handler,
         hidden: Callable[[], Coroutine[Any, Any, bool]] | None = None,
     ) -> Response:
@@ -166,7 +166,7 @@ class Route(APIRoute):
             partial(self._answer_within_limits, gate, read, handler),
         )
 
-    async def _read_request_body(self, gate: RequestPipeline, request: Request) -> RequestBody:
+    async def _read_request_body(self, gate: RequestPipeline, request: Request) -> ReadBody:
         """The body of a request that may change something.
 
         Raises:
@@ -175,15 +175,15 @@ class Route(APIRoute):
         types = request.headers.getlist("content-type")
         if self._takes_bytes:
             require_bytes_type(types)
-            return RequestBody()
+            return ReadBody()
         most = gate.max_json_bytes
         if self.permission.action is None:
             most = min(most, MAX_STRANGERS_BYTES)
         sent = await read_body(request.headers, request.receive, most)
         if not sent:
-            return RequestBody(sent)
+            return ReadBody(sent)
         require_json_type(types)
-        return RequestBody(sent, read_json(sent), has_value=True)
+        return ReadBody(sent, read_json(sent), has_value=True)
 
     async def _answer_within_limits(
         self, gate: RequestPipeline, request: Request, handler: Handler
@@ -199,7 +199,7 @@ class UnstoredResponseRoute(Route):
 
 
 @dataclass(frozen=True)
-class RequestBody:
+class ReadBody:
     """What a request brings: its bytes, None where they are not read here, and their JSON value."""
 
     sent: bytes | None = None
@@ -210,7 +210,7 @@ class RequestBody:
 class RequestWithReadBody(StarletteRequest):
     """A request whose body has been read, or is read by ``receive`` as it passes."""
 
-    def __init__(self, request: Request, body: RequestBody, receive: Receive | None = None):
+    def __init__(self, request: Request, body: ReadBody, receive: Receive | None = None):
         super().__init__(request.scope, receive or request.receive)
         if body.sent is not None:
             self._body = body.sent

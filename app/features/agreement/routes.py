@@ -6,7 +6,7 @@ from datetime import datetime
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from app.evaluation.annotation_distance import (
     Ball3DDistance,
@@ -38,6 +38,7 @@ from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.http.documents import (
     Document,
     ListDocument,
+    RequestBody,
     make_document_response,
     make_empty_response,
     respond_with,
@@ -97,24 +98,20 @@ class GroupComparisonDocument(Document):
         return GroupComparisonDocument.model_validate({**vars(found), "groups": groups})
 
 
-class LimitsEdit(BaseModel):
+class LimitsEdit(
+    RequestBody,
+    examples=[
+        {
+            "line_px": 5.0,
+            "markings": 1,
+            "ball_px": 3.0,
+            "diameter_px": 5.0,
+            "ball_m": 0.5,
+            "jac": 0.7,
+        }
+    ],
+):
     """Other limits."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [
-                {
-                    "line_px": 5.0,
-                    "markings": 1,
-                    "ball_px": 3.0,
-                    "diameter_px": 5.0,
-                    "ball_m": 0.5,
-                    "jac": 0.7,
-                }
-            ]
-        },
-    )
 
     line_px: float = Field(gt=0, le=10_000, allow_inf_nan=False)
     markings: int = Field(ge=0, le=100)
@@ -212,13 +209,8 @@ class CaseDocument(Document):
         )
 
 
-class Decision(BaseModel):
+class Decision(RequestBody, examples=[{"annotation": 7}, {"annotation": 7, "as_start": True}]):
     """Which annotation is taken over."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={"examples": [{"annotation": 7}, {"annotation": 7, "as_start": True}]},
-    )
 
     annotation: int = Field(ge=1, le=MAX_ID)
     as_start: bool = Field(

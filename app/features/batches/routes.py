@@ -7,7 +7,7 @@ from datetime import date, datetime
 from typing import Annotated
 
 from fastapi import APIRouter, BackgroundTasks, Depends, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from app.db.store import Store
 from app.features.agreement.service import compare_or_adopt_submission
@@ -37,6 +37,7 @@ from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id, Sees, S
 from app.http.documents import (
     Document,
     ListDocument,
+    RequestBody,
     make_document_responder,
     make_document_response,
     make_empty_response,
@@ -53,17 +54,10 @@ Name = Annotated[str, Field(min_length=1, max_length=MAX_TITLE)]
 People = Annotated[list[Annotated[str, Field(max_length=60)]], Field(max_length=200)]
 
 
-class NewBatchDocument(BaseModel):
+class NewBatchDocument(
+    RequestBody, examples=[{"name": "First forty", "q": "status:unreviewed sort:value", "size": 40}]
+):
     """Groups that shall be given out."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [
-                {"name": "First forty", "q": "status:unreviewed sort:value", "size": 40},
-            ]
-        },
-    )
 
     name: Name
     q: Annotated[str, Field(max_length=MAX_LISTED_LENGTH)] = Field(
@@ -72,7 +66,7 @@ class NewBatchDocument(BaseModel):
     size: Annotated[int, Field(ge=1, le=MOST_GROUPS)] | None = Field(
         default=None, description=f"The first so many; default: all, up to {MOST_GROUPS}."
     )
-    annotators: People = []
+    annotators: People = Field(default=[])
     reviewers: People = Field(
         default=[], description="Empty: every reviewer of the dataset may review the batch."
     )
@@ -99,12 +93,8 @@ class NewBatchDocument(BaseModel):
     )
 
 
-class BatchEdit(BaseModel):
+class BatchEdit(RequestBody, examples=[{"name": "Second half"}]):
     """What changes of a batch; what is left out stays."""
-
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"name": "Second half"}]}
-    )
 
     name: Name | None = None
     due: date | None = Field(default=None, description="null: on no day.")
@@ -151,10 +141,8 @@ class BatchGroupList(ListDocument[BatchGroup]):
     """The groups of a batch in the order in which they are given out."""
 
 
-class NextGroupRequest(BaseModel):
+class NextGroupRequest(RequestBody, examples=[{"after": 12}, {}]):
     """Where somebody comes from who asks for the next group."""
-
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"after": 12}, {}]})
 
     after: Annotated[int, Field(ge=1, le=MAX_ID)] | None = Field(
         default=None,
@@ -163,12 +151,8 @@ class NextGroupRequest(BaseModel):
     )
 
 
-class LeaseRequest(BaseModel):
+class LeaseRequest(RequestBody, examples=[{"take_over": False}]):
     """How a group is opened."""
-
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"take_over": False}]}
-    )
 
     take_over: bool = Field(default=False, description="Also when another person has it open.")
 

@@ -17,6 +17,7 @@ from app.http.deps import Actor, AppStore, Id
 from app.http.documents import (
     Document,
     ListDocument,
+    RequestBody,
     make_document_response,
     make_empty_response,
     respond_with,
@@ -42,12 +43,8 @@ class PlaceInView(BaseModel):
     y: float = Field(ge=-MAX_PIXEL, le=MAX_PIXEL, allow_inf_nan=False)
 
 
-class NewComment(BaseModel):
+class NewComment(RequestBody, examples=[{"text": "@anna, is this the ball?"}]):
     """Something to say; `@name` mentions somebody who sees the dataset."""
-
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"text": "@anna, is this the ball?"}]}
-    )
 
     text: Text
 
@@ -69,10 +66,8 @@ class NewThread(NewComment):
     at: PlaceInView | None = None
 
 
-class ThreadEdit(BaseModel):
+class ThreadEdit(RequestBody, examples=[{"resolved": True}]):
     """What becomes of a thread."""
-
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"resolved": True}]})
 
     resolved: bool
 

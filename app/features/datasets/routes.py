@@ -6,7 +6,7 @@ from datetime import datetime
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
-from pydantic import AliasPath, BaseModel, ConfigDict, Field
+from pydantic import AliasPath, BaseModel, Field
 
 from app.features.datasets import service as deletion
 from app.features.datasets import service as review
@@ -19,7 +19,13 @@ from app.features.solve.jobs import request_solve_job
 from app.http.access import get_current_login
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, QueryText, Sees, Services
-from app.http.documents import Document, ListDocument, make_document_response, respond_with
+from app.http.documents import (
+    Document,
+    ListDocument,
+    RequestBody,
+    make_document_response,
+    respond_with,
+)
 from app.http.permissions import Action, OwnedKind, RoleScope, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -94,10 +100,8 @@ class SummaryDocument(Document):
     )
 
 
-class DatasetDeletionRequest(BaseModel):
+class DatasetDeletionRequest(RequestBody, examples=[{"confirm": "demo"}]):
     """The name of the dataset, once more: nobody deletes one by a slip."""
-
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"confirm": "demo"}]})
 
     confirm: Annotated[str, Field(max_length=200)] = ""
 

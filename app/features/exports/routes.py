@@ -10,7 +10,7 @@ from datetime import datetime
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Path, Query, Request, Response
-from pydantic import BaseModel, ConfigDict, Field, StrictBool
+from pydantic import BaseModel, Field, StrictBool
 from starlette.responses import FileResponse, RedirectResponse, StreamingResponse
 
 from app.config import Settings
@@ -37,6 +37,7 @@ from app.http.deps import (
 from app.http.documents import (
     Document,
     ListDocument,
+    RequestBody,
     make_document_response,
     make_empty_response,
     respond_with,
@@ -67,13 +68,8 @@ ZIP: Responses = {
 }
 
 
-class ExportRequest(BaseModel):
+class ExportRequest(RequestBody, examples=[{"dataset": "sample", "format": "soccernet-v3d"}]):
     """Which groups of which dataset, in which format."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={"examples": [{"dataset": "sample", "format": "soccernet-v3d"}]},
-    )
 
     dataset: Annotated[str, Field(min_length=1, max_length=200)]
     format: ExportFormat

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Response
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from app.errors import InputError
 from app.features.datasets.service import dataset_id
@@ -27,6 +27,7 @@ from app.features.solutions.service import solve_and_encode
 from app.http.deps import STRONG_ETAG, Actor, AppServices, DatasetPath, DryRun
 from app.http.documents import (
     Document,
+    RequestBody,
     make_document_responder,
     make_document_response,
     respond_with,
@@ -45,10 +46,8 @@ _Key = Annotated[str, Field(min_length=1, max_length=1000)]
 router = APIRouter(prefix="/datasets/{dataset}/edits", tags=["views"], route_class=Route)
 
 
-class ViewEditItem(BaseModel):
+class ViewEditItem(RequestBody):
     """New points for some markings of one view, its ball, or both."""
-
-    model_config = ConfigDict(extra="forbid")
 
     view: Annotated[int, Field(strict=True, ge=1, le=MAX_ID)] | _Key = Field(
         description="Id of the view; or its key, in the group of the key `group`."
@@ -96,32 +95,28 @@ class ViewEditItem(BaseModel):
         return edits
 
 
-class BulkEdit(BaseModel):
-    """Balls and lines of many views."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [
+class BulkEdit(
+    RequestBody,
+    examples=[
+        {
+            "items": [
                 {
-                    "items": [
-                        {
-                            "view": 2,
-                            "etag": '"f5549b073a50de7c-79ed742e"',
-                            "ball": {"box": [801.5, 322.0, 14.0, 14.5]},
-                        },
-                        {
-                            "group": "epl/2015-2016/match/7.png",
-                            "view": "7_1.png",
-                            "etag": '"0c2b9be1f6a4d7e3-5d0c1a2b"',
-                            "lines": {"Circle central": None},
-                        },
-                    ]
+                    "view": 2,
+                    "etag": '"f5549b073a50de7c-79ed742e"',
+                    "ball": {"box": [801.5, 322.0, 14.0, 14.5]},
                 },
-                {"if_match": "*", "items": [{"view": 2, "ball": None}]},
+                {
+                    "group": "epl/2015-2016/match/7.png",
+                    "view": "7_1.png",
+                    "etag": '"0c2b9be1f6a4d7e3-5d0c1a2b"',
+                    "lines": {"Circle central": None},
+                },
             ]
         },
-    )
+        {"if_match": "*", "items": [{"view": 2, "ball": None}]},
+    ],
+):
+    """Balls and lines of many views."""
 
     items: Annotated[
         list[ViewEditItem], Field(min_length=1, max_length=MAX_ITEMS, fail_fast=True)

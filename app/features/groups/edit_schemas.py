@@ -16,6 +16,7 @@ from pydantic import (
 )
 
 from app.errors import UnknownMarkingError
+from app.http.documents import RequestBody
 from app.soccer.annotation import BallAnnotation, format_followed_from_group
 from app.soccer.choices import CalibrationChoice
 from app.soccer.frames import MAX_PIXEL, Box, ImagePoint
@@ -60,10 +61,8 @@ BoxNumbers = tuple[Pixel, Pixel, Length, Length]
 PointNumbers = tuple[Pixel, Pixel]
 
 
-class Point(BaseModel):
+class Point(RequestBody):
     """A point of an image, pixels of the annotated size, (0, 0) the centre of the first pixel."""
-
-    model_config = ConfigDict(extra="forbid")
 
     x: Pixel
     y: Pixel
@@ -79,18 +78,14 @@ LineEdits = Annotated[
 ]
 
 
-class LinesEdit(BaseModel):
+class LinesEdit(
+    RequestBody,
+    examples=[
+        {"lines": {"Middle line": [{"x": 640.5, "y": 120.0}, {"x": 655.0, "y": 700.0}]}},
+        {"lines": {"Circle central": None}},
+    ],
+):
     """New points for some markings: null or no points delete one, absent ones stay."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [
-                {"lines": {"Middle line": [{"x": 640.5, "y": 120.0}, {"x": 655.0, "y": 700.0}]}},
-                {"lines": {"Circle central": None}},
-            ]
-        },
-    )
 
     lines: LineEdits
     proposed: Annotated[list[Marking], Field(max_length=len(MARKINGS))] = Field(
@@ -220,13 +215,8 @@ _Shift = Annotated[float, Field(ge=-MAX_SHIFT, le=MAX_SHIFT)]
 _Sigma = Annotated[float, Field(ge=0, le=1)]
 
 
-class PictureGeometryEdit(BaseModel):
+class PictureGeometryEdit(RequestBody, examples=[{}, {"aspect": 4 / 3, "sigma": [0, 0, 0]}]):
     """What was done to a picture since it was taken; what is absent its own lines say."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={"examples": [{}, {"aspect": 4 / 3, "sigma": [0, 0, 0]}]},
-    )
 
     aspect: float = Field(
         default=OPEN.aspect,
@@ -287,11 +277,7 @@ class ViewEdit(BaseModel):
         return self
 
 
-class StationCalibrationSourceEdit(BaseModel):
+class StationCalibrationSourceEdit(RequestBody, examples=[{"calibration": "lines"}]):
     """Choose which calibration of a static camera counts."""
-
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"calibration": "lines"}]}
-    )
 
     calibration: CalibrationChoice

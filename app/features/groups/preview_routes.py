@@ -15,7 +15,7 @@ from functools import partial
 from typing import Annotated, TypeVar
 
 from fastapi import Request
-from pydantic import BaseModel, ConfigDict, Field, StrictBool
+from pydantic import Field, StrictBool
 from starlette.concurrency import run_in_threadpool
 
 from app.config import Settings
@@ -37,7 +37,7 @@ from app.features.groups.edit_schemas import (
 from app.features.groups.solution_schemas import SolutionDocument
 from app.features.groups.submit import Solver, solve_edited_group
 from app.features.groups.view_paint import PaintUpdater, PaintUpdaterWithoutPictures
-from app.http.documents import Document
+from app.http.documents import Document, RequestBody
 from app.http.request_limits import is_large_request
 from app.log import log_to_stderr
 from app.soccer.group import Group
@@ -61,10 +61,8 @@ _stores: dict[str, Store] = {}
 """In the process of previews: the database, once it was opened."""
 
 
-class ViewPreviewChanges(BaseModel):
+class ViewPreviewChanges(RequestBody):
     """Changes to one view; what is absent stays as it is."""
-
-    model_config = ConfigDict(extra="forbid")
 
     lines: LineEdits = Field(default_factory=dict)
     ball: BallEdit | None = Field(
@@ -77,15 +75,10 @@ class ViewPreviewChanges(BaseModel):
     )
 
 
-class PreviewRequest(BaseModel):
+class PreviewRequest(
+    RequestBody, examples=[{"views": {"7_1.png": {"ball": {"box": [801.5, 322.0, 14.0, 14.5]}}}}]
+):
     """Changes by the key of the view."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [{"views": {"7_1.png": {"ball": {"box": [801.5, 322.0, 14.0, 14.5]}}}}]
-        },
-    )
 
     views: Annotated[dict[str, ViewPreviewChanges], Field(max_length=64)]
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
+from pydantic import Field, StrictBool, model_validator
 
 from app.features.imports.jobs import ImportRequest
 from app.features.imports.uploads import FolderItem
-from app.http.documents import Document, ListDocument
+from app.http.documents import Document, ListDocument, RequestBody
 from app.soccer.choices import CalibrationChoice, ImportFormat, PolicyName
 from app.soccer.frames import MAX_SIDE
 
@@ -18,10 +18,8 @@ Offset = Annotated[int, Field(ge=-999_999, le=999_999)]
 Side = Annotated[int, Field(ge=2, le=MAX_SIDE)]
 
 
-class UploadOrFolder(BaseModel):
+class UploadOrFolder(RequestBody):
     """Where files are: exactly one of an upload and a folder, which may be `s3://NAME/...` in a store."""
-
-    model_config = ConfigDict(extra="forbid")
 
     upload: Annotated[str, Field(pattern=r"^[0-9a-f]{32}$")] | None = None
     folder: Annotated[str, Field(min_length=1, max_length=4000)] | None = None
@@ -37,10 +35,8 @@ class UploadOrFolder(BaseModel):
         return {"upload": self.upload} if self.upload else {"folder": self.folder or ""}
 
 
-class ImportOptions(BaseModel):
+class ImportOptions(RequestBody):
     """What the files do not say themselves."""
-
-    model_config = ConfigDict(extra="forbid")
 
     calibration: CalibrationChoice | None = Field(
         default=None,
@@ -82,22 +78,18 @@ class ImportOptions(BaseModel):
     )
 
 
-class ImportBody(BaseModel):
+class ImportBody(
+    RequestBody,
+    examples=[
+        {
+            "dataset": "league",
+            "format": "soccernet-v3",
+            "source": {"folder": "soccernet/england_epl"},
+            "dry_run": True,
+        }
+    ],
+):
     """What to import."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [
-                {
-                    "dataset": "league",
-                    "format": "soccernet-v3",
-                    "source": {"folder": "soccernet/england_epl"},
-                    "dry_run": True,
-                }
-            ]
-        },
-    )
 
     dataset: Annotated[str, Field(min_length=1, max_length=200)]
     format: ImportFormat

@@ -6,7 +6,7 @@ from datetime import datetime
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, BackgroundTasks, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from app.evaluation.annotation_distance import DistanceFromTruth
 from app.features.agreement.adjudicate import adopt_into_group
@@ -35,7 +35,13 @@ from app.features.queue.query import MAX_LISTED_LENGTH
 from app.http.access import get_current_login
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
-from app.http.documents import Document, ListDocument, make_document_response, respond_with
+from app.http.documents import (
+    Document,
+    ListDocument,
+    RequestBody,
+    make_document_response,
+    respond_with,
+)
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -43,13 +49,8 @@ from app.json_text import MAX_ID
 from app.soccer.choices import GoldStart
 
 
-class ReturnReason(BaseModel):
+class ReturnReason(RequestBody, examples=[{"reason": "The far goal line is missing in view B."}]):
     """Why something that was submitted goes back."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={"examples": [{"reason": "The far goal line is missing in view B."}]},
-    )
 
     reason: Annotated[str, Field(max_length=MAX_REASON)] = Field(
         default="", description="A sentence for the person who gets the group back."
@@ -71,36 +72,25 @@ class IndependentAnnotationList(ListDocument[DisclosedAnnotation]):
     """Own annotations, oldest first: for a lead everybody's, else those of whoever asks."""
 
 
-class GoldEdit(BaseModel):
+class GoldEdit(RequestBody, examples=[{"start": "without_balls"}]):
     """What annotators of a gold group begin with.
 
     `imported`: as its dataset brought it; `without_balls`: what it holds but for the balls;
     `bare`: its pictures alone.
     """
 
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"start": "without_balls"}]}
-    )
-
     start: GoldStart = "imported"
 
 
-class GoldChoiceDocument(BaseModel):
+class GoldChoiceDocument(
+    RequestBody,
+    examples=[{"source": "sample", "start": "bare"}, {"source": "version", "version": "v1"}],
+):
     """Groups that become gold by what is known of them.
 
     `sample`: by the cameras and the ball with which a generated sample was drawn; `version`: by what
     a frozen version holds, upon which people agreed or somebody decided.
     """
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [
-                {"source": "sample", "start": "bare"},
-                {"source": "version", "version": "v1"},
-            ]
-        },
-    )
 
     source: Literal["sample", "version"]
     version: Annotated[str, Field(min_length=1, max_length=100)] | None = Field(
@@ -145,25 +135,17 @@ class GoldReportDocument(Document):
     people: list[PersonResultsDocument]
 
 
-class GuidelinesEdit(BaseModel):
+class GuidelinesEdit(
+    RequestBody, examples=[{"text": "## Balls\n\nDraw tight boxes.", "based_on": 0}]
+):
     """Another version of the guidelines."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={"examples": [{"text": "## Balls\n\nDraw tight boxes.", "based_on": 0}]},
-    )
 
     text: Annotated[str, Field(max_length=MAX_LETTERS)]
     based_on: Annotated[int, Field(ge=0, le=2**31, description="The version that was changed.")]
 
 
-class NewGuidelinePicture(BaseModel):
+class NewGuidelinePicture(RequestBody, examples=[{"upload": "0123456789abcdef0123456789abcdef"}]):
     """A picture that was uploaded."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={"examples": [{"upload": "0123456789abcdef0123456789abcdef"}]},
-    )
 
     upload: Annotated[str, Field(pattern=r"^[0-9a-f]{32}$")]
 

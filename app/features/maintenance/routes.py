@@ -6,12 +6,13 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
+from pydantic import AwareDatetime, BaseModel, Field
 
 from app.errors import BusyError, NotFoundError, OverloadedError, StorageError
 from app.features.maintenance.service import LONGEST, Banner, clear_banner, set_banner
 from app.features.queue.changes import read_newest_entry_id
 from app.http.deps import Actor, AppStore
+from app.http.documents import RequestBody
 from app.http.metrics import SharedProcessMetrics
 from app.http.permissions import Action, may, open_to_all
 from app.http.problem import responses
@@ -22,17 +23,11 @@ maintenance_router = APIRouter(prefix="/maintenance", tags=["sessions"], route_c
 health_router = APIRouter(tags=["health"], route_class=Route)
 
 
-class NewBanner(BaseModel):
+class NewBanner(
+    RequestBody,
+    examples=[{"text": "Upgrade at 18:00, ten minutes.", "until": "2099-11-28T18:10:00Z"}],
+):
     """A notice, and when it is shown."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [
-                {"text": "Upgrade at 18:00, ten minutes.", "until": "2099-11-28T18:10:00Z"}
-            ]
-        },
-    )
 
     text: Annotated[str, Field(min_length=1, max_length=LONGEST)] = Field(
         description="One line, shown on every page, also before people log in."

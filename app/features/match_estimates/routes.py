@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, Field, model_validator
 
 from app.db.session import Session
 from app.features.groups.edit_schemas import PictureGeometryEdit
@@ -21,7 +21,13 @@ from app.features.policies.service import read_policy
 from app.features.solve.jobs import change_and_return_solve_job
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath
-from app.http.documents import Document, ListDocument, make_document_response, respond_with
+from app.http.documents import (
+    Document,
+    ListDocument,
+    RequestBody,
+    make_document_response,
+    respond_with,
+)
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import COMPUTE, limit
@@ -43,22 +49,16 @@ class MatchPictureGeometriesDocument(ListDocument[MatchPictureGeometry]):
     """The pictures of a dataset's matches, by name of the match."""
 
 
-class MatchSelection(BaseModel):
+class MatchSelection(RequestBody, examples=[{}]):
     """Which matches a job is to look at."""
-
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{}]})
 
     match: str | None = Field(
         default=None, min_length=1, max_length=1000, description="This match alone; null: all."
     )
 
 
-class MatchPictureGeometryChange(BaseModel):
+class MatchPictureGeometryChange(RequestBody, examples=[{"match": "a/b/c", "picture": None}]):
     """Say what was done to the pictures of a match's main camera."""
-
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"match": "a/b/c", "picture": None}]}
-    )
 
     match: str = Field(min_length=1, max_length=1000)
     picture: PictureGeometryEdit | None = Field(
@@ -72,10 +72,8 @@ class SharedPositionsDocument(ListDocument[SharedPositionState]):
     used: bool = Field(description="Whether the policy uses them: `calibration.share_position`.")
 
 
-class RigRequest(BaseModel):
+class RigRequest(RequestBody, examples=[{}]):
     """Adjust the static cameras of a dataset; without `accept` that is a proposal."""
-
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{}]})
 
     accept: Literal["cameras", "sigma"] | None = Field(
         default=None,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter, Query
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from app.features.notifications import service as bell
 from app.features.notifications.queries import Notification
@@ -13,7 +13,7 @@ from app.features.notifications.service import NotificationPage
 from app.features.people.session_routes import Me
 from app.http.cursor import Before, Cursor, parse_descending_cursor
 from app.http.deps import AppStore
-from app.http.documents import ListDocument, make_document_responder, respond_with
+from app.http.documents import ListDocument, RequestBody, make_document_responder, respond_with
 from app.http.permissions import Action, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -29,12 +29,8 @@ class NotificationsDocument(ListDocument[Notification]):
     unread: int = Field(description="How much of all of it they have not seen yet.")
 
 
-class SeenNotifications(BaseModel):
+class SeenNotifications(RequestBody, examples=[{"ids": [12, 15]}, {"ids": None}]):
     """What somebody has seen."""
-
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"ids": [12, 15]}, {"ids": None}]}
-    )
 
     ids: list[Annotated[int, Field(ge=1, le=MAX_ID)]] | None = Field(
         default=None, max_length=200, description="null: everything."

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from anyio import to_thread
 from fastapi import APIRouter, Request, Response
-from pydantic import BaseModel, ConfigDict, Field, StrictBool
+from pydantic import Field, StrictBool
 
 from app.features.groups.edit_schemas import LineEdits, points_by_marking
 from app.features.groups.schemas import LineDocuments, lines_to_document
@@ -32,7 +32,13 @@ from app.features.paint.proposals import get_group_proposals, get_proposal_count
 from app.features.paint.service import MatchPaintSummary, summarize_paint_readings
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id
-from app.http.documents import Document, ListDocument, make_document_response, respond_with
+from app.http.documents import (
+    Document,
+    ListDocument,
+    RequestBody,
+    make_document_response,
+    respond_with,
+)
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import TRANSFER, limit
@@ -60,18 +66,11 @@ class DatasetPaintDocument(ListDocument[MatchPaintSummary]):
     used: bool = Field(description="Whether the policy uses it: `calibration.source`.")
 
 
-class UnsavedLinesRequest(BaseModel):
+class UnsavedLinesRequest(
+    RequestBody,
+    examples=[{}, {"lines": {"Middle line": [{"x": 640.5, "y": 120.0}, {"x": 655.0, "y": 700.0}]}}],
+):
     """Lines that are not saved yet; without any those count that are."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [
-                {},
-                {"lines": {"Middle line": [{"x": 640.5, "y": 120.0}, {"x": 655.0, "y": 700.0}]}},
-            ]
-        },
-    )
 
     lines: LineEdits = Field(default_factory=dict)
 

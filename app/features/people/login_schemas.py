@@ -12,7 +12,7 @@ from app.features.people.passkeys import Passkey
 from app.features.people.roles import Scope
 from app.features.people.schemas import EXAMPLE, Code, Name, SessionDocument, Token
 from app.features.people.sign_on_rules import Identity
-from app.http.documents import Document, ListDocument
+from app.http.documents import Document, ListDocument, RequestBody
 
 Base64url = Annotated[str, Field(min_length=1, max_length=16_384, pattern=r"^[A-Za-z0-9_-]+$")]
 _EXAMPLE = {"id": "q0xBeRXL", "rawId": "q0xBeRXL", "type": "public-key"}
@@ -56,49 +56,41 @@ class PasskeyAssertion(_Credential):
     response: Assertion
 
 
-class NewPasskey(BaseModel):
+class NewPasskey(
+    RequestBody,
+    examples=[
+        {
+            "name": "phone",
+            "credential": {
+                **_EXAMPLE,
+                "response": {"clientDataJSON": "e30", "attestationObject": "o2M"},
+            },
+        }
+    ],
+):
     """A passkey, and how its person calls it."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [
-                {
-                    "name": "phone",
-                    "credential": {
-                        **_EXAMPLE,
-                        "response": {"clientDataJSON": "e30", "attestationObject": "o2M"},
-                    },
-                }
-            ]
-        },
-    )
 
     name: Annotated[str, Field(min_length=1, max_length=40)]
     credential: NewCredential
 
 
-class PasskeyLogin(BaseModel):
+class PasskeyLogin(
+    RequestBody,
+    examples=[
+        {
+            "credential": {
+                **_EXAMPLE,
+                "response": {
+                    "clientDataJSON": "e30",
+                    "authenticatorData": "SZYN",
+                    "signature": "MEUC",
+                    "userHandle": "MQ",
+                },
+            }
+        }
+    ],
+):
     """A passkey, in the place of name and password."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [
-                {
-                    "credential": {
-                        **_EXAMPLE,
-                        "response": {
-                            "clientDataJSON": "e30",
-                            "authenticatorData": "SZYN",
-                            "signature": "MEUC",
-                            "userHandle": "MQ",
-                        },
-                    }
-                }
-            ]
-        },
-    )
 
     credential: PasskeyAssertion
 
@@ -137,13 +129,8 @@ class PasskeyMade(Document):
 Told = Annotated[str, Field(min_length=1, max_length=4096)]
 
 
-class SignOnBegin(BaseModel):
+class SignOnBegin(RequestBody, examples=[{"to": "/groups"}, {"link": EXAMPLE["token"]}]):
     """Where somebody wants to go, and the link that they follow, if any."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={"examples": [{"to": "/groups"}, {"link": EXAMPLE["token"]}]},
-    )
 
     to: Annotated[str, Field(min_length=1, max_length=2000)] = Field(
         default="/groups", description="A page of this server, to be shown then."
@@ -163,15 +150,10 @@ class SignOnStarted(Document):
     )
 
 
-class SignOnCallback(BaseModel):
+class SignOnCallback(
+    RequestBody, examples=[{"state": EXAMPLE["token"], "code": "SplxlOBeZQQYbYS6WxSbIA"}]
+):
     """What the provider has added to the address of the page `/login`."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [{"state": EXAMPLE["token"], "code": "SplxlOBeZQQYbYS6WxSbIA"}]
-        },
-    )
 
     state: Token
     code: Told
@@ -201,15 +183,10 @@ class OwnLoginMethods(Document):
     identity: Identity | None
 
 
-class NewAccessToken(BaseModel):
+class NewAccessToken(
+    RequestBody, examples=[{"name": "nightly export", "scopes": ["export"], "days": 30}]
+):
     """What a token shall be for."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [{"name": "nightly export", "scopes": ["export"], "days": 30}]
-        },
-    )
 
     name: Annotated[
         str,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, StrictBool
+from pydantic import ConfigDict, Field, StrictBool
 from pydantic.config import JsonDict
 
 from app.features.maintenance.service import Banner
@@ -13,7 +13,7 @@ from app.features.people.invitations import MOST, InvitationOutcome
 from app.features.people.logins import LoginMethod
 from app.features.people.roles import Action, Role
 from app.features.people.service import Person, SingleDatasetRole
-from app.http.documents import Document, ListDocument
+from app.http.documents import Document, ListDocument, RequestBody
 
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 Password = Annotated[str, Field(min_length=1, max_length=200)]
@@ -25,13 +25,8 @@ EXAMPLE: JsonDict = {
 }
 
 
-class LoginCredentials(BaseModel):
+class LoginCredentials(RequestBody, examples=[{"name": "anna", "password": EXAMPLE["password"]}]):
     """Name and password of a login."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={"examples": [{"name": "anna", "password": EXAMPLE["password"]}]},
-    )
 
     name: Name
     password: Password
@@ -44,20 +39,14 @@ class LoginCredentials(BaseModel):
     )
 
 
-class PasswordOnly(BaseModel):
+class PasswordOnly(RequestBody, examples=[{"password": EXAMPLE["password"]}]):
     """One's own password, once more; whoever came by single sign-on just now needs none."""
-
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"password": EXAMPLE["password"]}]}
-    )
 
     password: Password | None = None
 
 
-class CodeOnly(BaseModel):
+class CodeOnly(RequestBody, examples=[{"code": "123456"}]):
     """What the authenticator shows at this moment."""
-
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"code": "123456"}]})
 
     code: Code
 
@@ -68,36 +57,25 @@ class RecoveryCodes(Document):
     codes: list[str]
 
 
-class TeamSettings(BaseModel):
+class TeamSettings(RequestBody, examples=[{"require_second_factor": True}]):
     """What counts for everybody."""
-
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"require_second_factor": True}]}
-    )
 
     require_second_factor: StrictBool = Field(
         description="Who has no second factor makes one before anything else."
     )
 
 
-class PasswordEdit(BaseModel):
+class PasswordEdit(
+    RequestBody, examples=[{"old": EXAMPLE["password"], "new": "three other words"}]
+):
     """One's own password, and the one that takes its place."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={"examples": [{"old": EXAMPLE["password"], "new": "three other words"}]},
-    )
 
     old: Password
     new: Password
 
 
-class LinkToken(BaseModel):
+class LinkToken(RequestBody, examples=[{"token": EXAMPLE["token"]}]):
     """The part of a link that follows its #."""
-
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"token": EXAMPLE["token"]}]}
-    )
 
     token: Token
 
@@ -168,12 +146,8 @@ class OpenSessionList(ListDocument[OpenSessionDocument]):
     """Sessions, the one that was used last first."""
 
 
-class NewUser(BaseModel):
+class NewUser(RequestBody, examples=[{"name": "anna", "role": "reviewer"}]):
     """A person for whom an account is to be made."""
-
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"name": "anna", "role": "reviewer"}]}
-    )
 
     name: Annotated[str, Field(min_length=1, max_length=40)]
     role: Role
@@ -183,12 +157,8 @@ class NewUser(BaseModel):
     )
 
 
-class LinkRenewal(BaseModel):
+class LinkRenewal(RequestBody, examples=[{"email": "anna@example.org"}]):
     """Where another link for somebody goes."""
-
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"email": "anna@example.org"}]}
-    )
 
     email: Annotated[str, Field(max_length=320)] | None = Field(
         default=None,
@@ -196,10 +166,8 @@ class LinkRenewal(BaseModel):
     )
 
 
-class InvitedPerson(BaseModel):
+class InvitedPerson(RequestBody):
     """A row of a list of people to invite; what is wrong with it, the report says."""
-
-    model_config = ConfigDict(extra="forbid")
 
     name: Annotated[str, Field(max_length=200)]
     role: Annotated[str, Field(max_length=200)]
@@ -208,22 +176,18 @@ class InvitedPerson(BaseModel):
     )
 
 
-class InvitationList(BaseModel):
-    """People who shall have an account."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [
-                {
-                    "people": [
-                        {"name": "anna", "role": "reviewer", "email": "anna@example.org"},
-                        {"name": "ben", "role": "annotator"},
-                    ]
-                }
+class InvitationList(
+    RequestBody,
+    examples=[
+        {
+            "people": [
+                {"name": "anna", "role": "reviewer", "email": "anna@example.org"},
+                {"name": "ben", "role": "annotator"},
             ]
-        },
-    )
+        }
+    ],
+):
+    """People who shall have an account."""
 
     people: Annotated[list[InvitedPerson], Field(min_length=1, max_length=MOST)]
 
@@ -237,12 +201,8 @@ class InvitationReport(ListDocument[InvitationOutcome]):
     mailed: int = Field(description="Letters that the mail server has taken.")
 
 
-class UserEdit(BaseModel):
+class UserEdit(RequestBody, examples=[{"role": "lead"}, {"disabled": True}]):
     """What changes of an account."""
-
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"role": "lead"}, {"disabled": True}]}
-    )
 
     role: Role | None = None
     disabled: bool | None = None
@@ -272,12 +232,8 @@ class UserWithLink(Document):
     )
 
 
-class MemberEdit(BaseModel):
+class MemberEdit(RequestBody, examples=[{"role": "reviewer"}, {"role": None}]):
     """What somebody shall be in a dataset."""
-
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"role": "reviewer"}, {"role": None}]}
-    )
 
     role: Role | None = Field(
         description="null: what they are everywhere counts here again; `admin` is of no dataset."

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
-from pydantic import AliasPath, BaseModel, ConfigDict, Field
+from pydantic import AliasPath, BaseModel, Field
 
 from app.features.datasets.service import get_dataset_head
 from app.features.groups.schemas import PitchSize
@@ -20,7 +20,13 @@ from app.features.pitches.service import DatasetPitches, read_pitches
 from app.features.solve.jobs import PitchesAndJob, request_pitch_change, request_solve_job
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, IfMatch
-from app.http.documents import Document, ListDocument, make_document_response, respond_with
+from app.http.documents import (
+    Document,
+    ListDocument,
+    RequestBody,
+    make_document_response,
+    respond_with,
+)
 from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, RoleScope, may
 from app.http.problem import Responses, responses
@@ -110,13 +116,8 @@ class PitchesDocument(ListDocument[MatchPitchDocument]):
     etag: str = Field(description="What a change of them builds on.")
 
 
-class PitchChange(BaseModel):
+class PitchChange(RequestBody, examples=[{"match": "a/b/c", "length": 103.0, "width": 66.0}]):
     """Give a match another pitch: all its groups at once."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={"examples": [{"match": "a/b/c", "length": 103.0, "width": 66.0}]},
-    )
 
     match: str = Field(max_length=1000, description="Empty: all groups that have none.")
     length: Annotated[float, Field(ge=LENGTH_RANGE[0], le=LENGTH_RANGE[1])]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Any
 
-from pydantic import AliasPath, BaseModel, ConfigDict, Field, create_model
+from pydantic import AliasPath, Field, create_model
 
 from app.features.policies.service import (
     MAX_CHARACTERS,
@@ -13,7 +13,7 @@ from app.features.policies.service import (
     policy_to_values,
     policy_to_yaml,
 )
-from app.http.documents import Document, ListDocument
+from app.http.documents import Document, ListDocument, RequestBody
 from app.soccer.policy import CalibrationPolicy, Policy
 from app.soccer.thresholds import Asks, list_thresholds
 
@@ -35,19 +35,15 @@ class PolicyDocument(_PolicyFields):
     """All thresholds; per cent are of the image diagonal."""
 
 
-class PolicyChange(BaseModel):
+class PolicyChange(
+    RequestBody,
+    examples=[
+        {"name": "strict"},
+        {"name": "tight", "values": {"tau_percent": 0.5}},
+        {"yaml": "name: tight\ntau_percent: 0.5\n"},
+    ],
+):
     """The policy that a dataset shall be judged by: a name, thresholds, or a YAML text."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [
-                {"name": "strict"},
-                {"name": "tight", "values": {"tau_percent": 0.5}},
-                {"yaml": "name: tight\ntau_percent: 0.5\n"},
-            ]
-        },
-    )
 
     name: str | None = Field(
         default=None,

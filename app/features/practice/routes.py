@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Request
-from pydantic import AliasPath, BaseModel, ConfigDict, Field
+from pydantic import AliasPath, Field
 
 from app.features.groups.submit import load_group_state
 from app.features.jobs.queries import Job
@@ -21,7 +21,7 @@ from app.features.practice.service import (
 )
 from app.http.access import get_current_login
 from app.http.deps import Actor, AppServices, Id, Sees
-from app.http.documents import Document, respond_with
+from app.http.documents import Document, RequestBody, respond_with
 from app.http.permissions import Action, OwnedKind, RoleScope, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -32,10 +32,8 @@ LessonState = Literal["open", "mended", "right", "almost", "wrong"]
 router = APIRouter(tags=["practice"], route_class=Route)
 
 
-class StartPracticeRequest(BaseModel):
+class StartPracticeRequest(RequestBody):
     """How the practice begins."""
-
-    model_config = ConfigDict(extra="forbid")
 
     again: bool = Field(
         default=False, description="Forget verdicts and edits of the lessons and begin again."

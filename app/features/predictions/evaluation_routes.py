@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Response
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from app.errors import NotFoundError
 from app.evaluation.comparison import FIELDS, CellDifference, FrameOfTwoRuns
@@ -36,6 +36,7 @@ from app.http.deps import Actor, AppServices, AppStore, DatasetPath, Id
 from app.http.documents import (
     Document,
     ListDocument,
+    RequestBody,
     make_document_response,
     make_empty_response,
     respond_with,
@@ -73,13 +74,8 @@ Bound = Annotated[float | None, Query(ge=-1e9, le=1e9, allow_inf_nan=False)]
 JSON_FILE, CSV_FILE, PNG_FILE = "application/json", "text/csv", "image/png"
 
 
-class EvaluationBody(BaseModel):
+class EvaluationBody(RequestBody, examples=[{"predictions": 3, "version": 1, "split": "test"}]):
     """What to evaluate, and against what."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={"examples": [{"predictions": 3, "version": 1, "split": "test"}]},
-    )
 
     name: Annotated[str, Field(max_length=MAX_NAME)] = ""
     predictions: SetId | None = Field(

@@ -10,7 +10,6 @@ from pydantic import (
     AliasPath,
     BaseModel,
     BeforeValidator,
-    ConfigDict,
     Field,
     StrictBool,
     StrictInt,
@@ -26,7 +25,7 @@ from app.features.predictions.accept import (
 )
 from app.features.predictions.queries import PredictedBox, PredictionSet
 from app.features.queue.query import MAX_LENGTH
-from app.http.documents import Document, ListDocument
+from app.http.documents import Document, ListDocument, RequestBody
 from app.json_text import MAX_ID
 from app.soccer.choices import AnyPredictionFormat
 from app.soccer.frames import MAX_SIDE, ImageSize
@@ -43,15 +42,10 @@ StoredBox = Annotated[
 """As it was predicted: x, y of the top-left corner, width, height; whatever the file said."""
 
 
-class PredictionFilesRequest(BaseModel):
+class PredictionFilesRequest(
+    RequestBody, examples=[{"name": "yolo11l", "format": "coco", "upload": "9b2f0c6e5d7a4c18"}]
+):
     """Files of predictions: ball boxes, cameras, or both."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [{"name": "yolo11l", "format": "coco", "upload": "9b2f0c6e5d7a4c18"}]
-        },
-    )
 
     name: Annotated[str, Field(min_length=1, max_length=100)] | None = Field(
         default=None,
@@ -205,18 +199,14 @@ class GroupPredictionsDocument(ListDocument[GroupPrediction]):
         return GroupPredictionsDocument(sets=found.sets, items=items, accepted=found.accepted)
 
 
-class AcceptBody(BaseModel):
+class AcceptBody(
+    RequestBody,
+    examples=[
+        {"dataset": "sample", "predictions": 3, "q": "gate:ball", "min_score": 0.5},
+        {"dataset": "sample", "predictions": 3, "views": [31], "replace": True},
+    ],
+):
     """Which predictions become annotations: the surest one of each view."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [
-                {"dataset": "sample", "predictions": 3, "q": "gate:ball", "min_score": 0.5},
-                {"dataset": "sample", "predictions": 3, "views": [31], "replace": True},
-            ]
-        },
-    )
 
     dataset: Annotated[str, Field(max_length=200, description="Name or id.")]
     predictions: Annotated[int, Field(strict=True, ge=1, le=MAX_ID)]

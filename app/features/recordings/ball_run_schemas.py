@@ -5,23 +5,19 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, StrictBool
+from pydantic import Field, StrictBool
 
 from app.features.recordings.ball_runs import BallRunReview, StoredRun
 from app.features.recordings.follow import EACH_WAY
 from app.features.recordings.schemas import Frame
-from app.http.documents import Document, ListDocument
+from app.http.documents import Document, ListDocument, RequestBody
 from app.tracking.ball_run import BallClick, End
 
 Pixel = Annotated[float, Field(ge=-1, le=20_000, allow_inf_nan=False)]
 
 
-class BallClickRequest(BaseModel):
+class BallClickRequest(RequestBody, examples=[{"frame": 30, "x": 612.5, "y": 344.0}]):
     """A click on a ball."""
-
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"frame": 30, "x": 612.5, "y": 344.0}]}
-    )
 
     frame: Frame = Field(description="Number of the frame, from 0.")
     x: Pixel = Field(description="About the middle of the ball, pixels of the recording.")
@@ -32,10 +28,8 @@ class BallClickRequest(BaseModel):
         return BallClick(self.frame, self.x, self.y)
 
 
-class BallRunReviewRequest(BaseModel):
+class BallRunReviewRequest(RequestBody, examples=[{"accepted": True}]):
     """What a person says of a ball run; what is absent stays as it is."""
-
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"accepted": True}]})
 
     accepted: StrictBool | None = Field(
         default=None,

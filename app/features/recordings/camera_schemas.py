@@ -6,12 +6,12 @@ from datetime import datetime
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, StrictBool
+from pydantic import BaseModel, Field, StrictBool
 
 from app.features.file_tools.track import frame_to_row
 from app.features.groups.schemas import PitchSize
 from app.features.recordings.cameras import CameraTrackingSummary
-from app.http.documents import Document, ListDocument
+from app.http.documents import Document, ListDocument, RequestBody
 from app.json_text import MAX_ID
 from app.soccer.pitch import Pitch
 from app.tracking.track import FrameCamera
@@ -20,21 +20,15 @@ Frame = Annotated[int, Field(ge=0, le=MAX_ID)]
 CameraFormat = Literal["soccernet", "npz", "opentrackio"]
 
 
-class TrackCamerasRequest(BaseModel):
+class TrackCamerasRequest(RequestBody, examples=[{"first": 0, "last": 249}]):
     """A stretch of a recording that is tracked."""
-
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"first": 0, "last": 249}]}
-    )
 
     first: Frame = Field(description="Number of its first frame, from 0.")
     last: Frame = Field(description="Number of its last frame.")
 
 
-class CamerasHalfTurnRequest(BaseModel):
+class CamerasHalfTurnRequest(RequestBody, examples=[{"turned": True}]):
     """On which side the cameras of a stretch stand."""
-
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"turned": True}]})
 
     turned: StrictBool = Field(
         description="Whether they are turned by half a turn of the pitch against what the tracker gave."

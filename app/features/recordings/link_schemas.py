@@ -5,20 +5,18 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from app.features.recordings.link_suggestions import LiveShotSuggestion
 from app.features.recordings.link_values import Instant, LinkedShot, LinkTimeMap
 from app.features.recordings.links import MAX_INSTANTS
 from app.features.recordings.schemas import Frame
-from app.http.documents import Document, ListDocument
+from app.http.documents import Document, ListDocument, RequestBody
 from app.json_text import MAX_ID
 
 
-class LinkedLiveShot(BaseModel):
+class LinkedLiveShot(RequestBody):
     """A live shot of the recording."""
-
-    model_config = ConfigDict(extra="forbid")
 
     first: Frame = Field(description="Number of its first frame.")
     last: Frame = Field(description="Number of its last frame.")
@@ -32,43 +30,32 @@ class LinkedReplay(LinkedLiveShot):
     )
 
 
-class NewShotLink(BaseModel):
+class NewShotLink(
+    RequestBody,
+    examples=[
+        {
+            "live": {"first": 0, "last": 249},
+            "replay": {"recording": 1, "first": 300, "last": 700},
+        }
+    ],
+):
     """A replay and the live shot that it shows again."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [
-                {
-                    "live": {"first": 0, "last": 249},
-                    "replay": {"recording": 1, "first": 300, "last": 700},
-                }
-            ]
-        },
-    )
 
     live: LinkedLiveShot = Field(description="The live shot.")
     replay: LinkedReplay = Field(description="The replay.")
 
 
-class InstantEdit(BaseModel):
+class InstantEdit(RequestBody):
     """One instant in both shots."""
-
-    model_config = ConfigDict(extra="forbid")
 
     live: Frame = Field(description="Frame of the live shot that shows it.")
     replay: Frame = Field(description="Frame of the replay that shows it.")
 
 
-class InstantsEdit(BaseModel):
+class InstantsEdit(
+    RequestBody, examples=[{"instants": [{"live": 20, "replay": 340}, {"live": 60, "replay": 500}]}]
+):
     """All instants of a link."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [{"instants": [{"live": 20, "replay": 340}, {"live": 60, "replay": 500}]}]
-        },
-    )
 
     instants: Annotated[list[InstantEdit], Field(max_length=MAX_INSTANTS)] = Field(
         description="Pairs of frames that show the same instant."
@@ -83,10 +70,8 @@ class InstantsEdit(BaseModel):
         return [(one.live, one.replay) for one in self.instants]
 
 
-class LinkByBallRequest(BaseModel):
+class LinkByBallRequest(RequestBody, examples=[{}]):
     """Where the ball is seen in the two shots."""
-
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{}]})
 
     live_upload: Annotated[str, Field(max_length=64)] | None = Field(
         default=None,

@@ -5,28 +5,23 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, StrictBool
+from pydantic import Field, StrictBool
 
 from app.features.imports.schemas import UploadOrFolder
 from app.features.recordings.instants import MOST_AT_ONCE
 from app.features.recordings.match_clock import MAX_CLOCKS, Half, MatchClockReading
 from app.features.recordings.shots import MAX_SHOTS, RecordingShots, Shot
-from app.http.documents import Document, ListDocument
+from app.http.documents import Document, ListDocument, RequestBody
 from app.json_text import MAX_ID
 from app.soccer.choices import ShotKind, ShotStart
 
 Frame = Annotated[int, Field(ge=0, le=MAX_ID)]
 
 
-class NewRecording(BaseModel):
+class NewRecording(
+    RequestBody, examples=[{"dataset": "cup", "source": {"folder": "films/final.mp4"}}]
+):
     """A file that becomes a recording of a dataset."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [{"dataset": "cup", "source": {"folder": "films/final.mp4"}}]
-        },
-    )
 
     dataset: Annotated[str, Field(min_length=1, max_length=200)] = Field(
         description="Name; a dataset is made where there is none of that name."
@@ -68,10 +63,8 @@ class RecordingList(ListDocument[RecordingDocument]):
     """Recordings, the newest first."""
 
 
-class ClockReadingEdit(BaseModel):
+class ClockReadingEdit(RequestBody):
     """What the clock of the match shows in one frame."""
-
-    model_config = ConfigDict(extra="forbid")
 
     frame: Frame = Field(description="Number of the frame.")
     half: Half = Field(description="1 or 2; 3 and 4 are those of extra time.")
@@ -80,13 +73,10 @@ class ClockReadingEdit(BaseModel):
     )
 
 
-class RecordingChange(BaseModel):
+class RecordingChange(
+    RequestBody, examples=[{"clocks": [{"frame": 1200, "half": 1, "seconds": 760}]}]
+):
     """What is changed of a recording."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={"examples": [{"clocks": [{"frame": 1200, "half": 1, "seconds": 760}]}]},
-    )
 
     clocks: Annotated[list[ClockReadingEdit], Field(max_length=MAX_CLOCKS)] = Field(
         description="All readings of the clock of the match."
@@ -97,10 +87,8 @@ class RecordingChange(BaseModel):
         return [MatchClockReading(**clock.model_dump()) for clock in self.clocks]
 
 
-class ShotEdit(BaseModel):
+class ShotEdit(RequestBody):
     """A shot as it shall be."""
-
-    model_config = ConfigDict(extra="forbid")
 
     first: Frame = Field(description="Number of its first frame, from 0.")
     last: Frame = Field(description="Number of its last frame.")
@@ -111,15 +99,10 @@ class ShotEdit(BaseModel):
     )
 
 
-class ShotsEdit(BaseModel):
+class ShotsEdit(
+    RequestBody, examples=[{"shots": [{"first": 0, "last": 249, "kind": "main", "kept": True}]}]
+):
     """All shots of a recording, in their order."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [{"shots": [{"first": 0, "last": 249, "kind": "main", "kept": True}]}]
-        },
-    )
 
     shots: Annotated[list[ShotEdit], Field(max_length=MAX_SHOTS)] = Field(description="The shots.")
 
@@ -156,12 +139,8 @@ class ShotList(ListDocument[ShotDocument]):
         return ShotList(items=items, recording=found.recording.id, etag=found.etag)
 
 
-class InstantsRequest(BaseModel):
+class InstantsRequest(RequestBody, examples=[{"frames": [100, 125, 150]}]):
     """Frames that become groups."""
-
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"frames": [100, 125, 150]}]}
-    )
 
     frames: Annotated[list[Frame], Field(min_length=1, max_length=MOST_AT_ONCE)]
     propose: StrictBool = Field(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from app.features.datasets.service import MAX_TITLE, dataset_id
 from app.features.queue.query import MAX_LENGTH
@@ -15,7 +15,7 @@ from app.features.verdicts import service as reviewers
 from app.features.verdicts.service import Reviewer
 from app.http.cursor import paged
 from app.http.deps import Actor, AppStore, DatasetPath, Id
-from app.http.documents import ListDocument, make_document_response, respond_with
+from app.http.documents import ListDocument, RequestBody, make_document_response, respond_with
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -23,13 +23,8 @@ from app.http.route import Route
 router = APIRouter(tags=["queue"], route_class=Route)
 
 
-class NewSavedView(BaseModel):
+class NewSavedView(RequestBody, examples=[{"name": "Nearly there", "q": "jac<0.8 jac>0.75"}]):
     """A query and the name that it shall have."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={"examples": [{"name": "Nearly there", "q": "jac<0.8 jac>0.75"}]},
-    )
 
     name: Annotated[str, Field(min_length=1, max_length=MAX_TITLE)]
     q: Annotated[str, Field(max_length=MAX_LENGTH)]

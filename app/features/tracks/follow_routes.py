@@ -6,7 +6,7 @@ from typing import Annotated
 
 from anyio import to_thread
 from fastapi import APIRouter, Body, Request, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from app.features.groups.edit_schemas import BoxNumbers, PointNumbers
 from app.features.tracks.follow import (
@@ -20,7 +20,7 @@ from app.features.tracks.follow import (
 )
 from app.features.tracks.follow_sequence import FollowedSequence, FollowEnd
 from app.http.deps import AppServices, Id
-from app.http.documents import Document
+from app.http.documents import Document, RequestBody
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.request_limits import TRANSFER, limit
@@ -32,10 +32,8 @@ router = APIRouter(prefix="/views", tags=["views"], route_class=Route)
 CLIENT_GONE = 499
 
 
-class FollowRequest(BaseModel):
+class FollowRequest(RequestBody, examples=[{"frames": 50}]):
     """Which ball is followed, and how far."""
-
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"frames": 50}]})
 
     at: PointNumbers | None = Field(
         default=None,

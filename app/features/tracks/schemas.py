@@ -20,7 +20,7 @@ from app.features.tracks.service import (
 )
 from app.formats.tracks_writer import position_sigma
 from app.geometry.arrays import FloatArray
-from app.http.documents import Document, ListDocument
+from app.http.documents import Document, ListDocument, RequestBody
 from app.json_text import MAX_ID, replace_non_finite
 from app.tracking.ball_correct import is_near_correction
 from app.tracking.ball_track import BallMode, BallState, EventCorrection, EventKind
@@ -258,12 +258,8 @@ class GroupTrackList(ListDocument[GroupTrackDocument]):
     """The tracks that a group is in: at most one, unless stretches have changed."""
 
 
-class TrackEdit(BaseModel):
+class TrackEdit(RequestBody, examples=[{"verdict": "accepted"}]):
     """What a person says of a track; what is left out stays."""
-
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"verdict": "accepted"}]}
-    )
 
     verdict: Literal["accepted", "rejected", "none"] | None = Field(
         default=None, description="`none` takes the verdict back."

@@ -8,8 +8,6 @@ from typing import Annotated, Literal, Self
 from fastapi import APIRouter, BackgroundTasks, Query, Response
 from pydantic import (
     AwareDatetime,
-    BaseModel,
-    ConfigDict,
     Field,
     FiniteFloat,
     StrictBool,
@@ -33,6 +31,7 @@ from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun, Id,
 from app.http.documents import (
     Document,
     ListDocument,
+    RequestBody,
     make_document_responder,
     make_document_response,
     respond_with,
@@ -49,23 +48,19 @@ Name = Annotated[str, Field(max_length=400)]
 router = APIRouter(route_class=Route)
 
 
-class VerdictEdit(BaseModel):
+class VerdictEdit(
+    RequestBody,
+    examples=[
+        {"state": "accepted"},
+        {"state": "rejected", "reason": "bad_field_lines"},
+        {"state": "rejected", "reason": "other", "note": "wrong match"},
+    ],
+):
     """Accept, reject with a reason, defer, or take a verdict back.
 
     A rejection needs a reason; `other` needs a note, and so does accepting a group that fails a
     gate, or whose ball cannot be used.
     """
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [
-                {"state": "accepted"},
-                {"state": "rejected", "reason": "bad_field_lines"},
-                {"state": "rejected", "reason": "other", "note": "wrong match"},
-            ]
-        },
-    )
 
     state: VerdictState
     reason: Reason | None = None
@@ -91,15 +86,10 @@ class VerdictEdit(BaseModel):
         return self
 
 
-class DismissalEdit(BaseModel):
+class DismissalEdit(
+    RequestBody, examples=[{"kind": "ball_size", "view": "0_1.png", "dismissed": True}]
+):
     """A finding of the group, as its solution has it, and whether it is dismissed."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [{"kind": "ball_size", "view": "0_1.png", "dismissed": True}]
-        },
-    )
 
     kind: Literal[FINDING_KINDS]  # type: ignore[valid-type]
     view: Name | None = Field(default=None, description="Key of the view; null: the whole group.")
@@ -112,19 +102,15 @@ class DismissalEdit(BaseModel):
     note: Annotated[str, Field(max_length=MAX_NOTE)] | None = None
 
 
-class BulkVerdict(BaseModel):
+class BulkVerdict(
+    RequestBody,
+    examples=[
+        {"q": "status:unreviewed passes:yes sigma<0.3", "state": "accepted"},
+        {"q": "finding:sides_swapped", "state": "rejected", "reason": "sides_confused"},
+        {"q": "id:12,15,19", "state": "deferred"},
+    ],
+):
     """A verdict, and the query whose groups shall have it."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [
-                {"q": "status:unreviewed passes:yes sigma<0.3", "state": "accepted"},
-                {"q": "finding:sides_swapped", "state": "rejected", "reason": "sides_confused"},
-                {"q": "id:12,15,19", "state": "deferred"},
-            ]
-        },
-    )
 
     q: Annotated[
         str,

@@ -9,7 +9,6 @@ from fastapi import APIRouter, Depends, Path, Query, Response
 from pydantic import (
     BaseModel,
     BeforeValidator,
-    ConfigDict,
     Field,
     StrictBool,
     StrictInt,
@@ -40,7 +39,13 @@ from app.features.versions.queries import Verification
 from app.features.versions.verify import VerifyDifference
 from app.http.cursor import paged
 from app.http.deps import Actor, AppServices, AppStore, DatasetPath, DryRun
-from app.http.documents import Document, ListDocument, make_document_response, respond_with
+from app.http.documents import (
+    Document,
+    ListDocument,
+    RequestBody,
+    make_document_response,
+    respond_with,
+)
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.route import Route
@@ -60,10 +65,8 @@ VersionId = (
 Camera = Annotated[str, Field(min_length=1, max_length=200)]
 
 
-class SplitChoice(BaseModel):
+class SplitChoice(RequestBody):
     """How a version is split into train and test."""
-
-    model_config = ConfigDict(extra="forbid")
 
     kind: SplitKind = Field(
         default="given", description="As the dataset says; drawn by match; by camera (ISSIA)."
@@ -75,22 +78,17 @@ class SplitChoice(BaseModel):
             gt=0, lt=1, description="Share of the matches that go to test, in the draw by match."
         ),
     ] = 0.2
-    test_cameras: Annotated[list[Camera], Field(min_length=1, max_length=100)] = list(TEST_CAMERAS)
+    test_cameras: list[Camera] = Field(default=list(TEST_CAMERAS), min_length=1, max_length=100)
 
     def to_split(self) -> Split:
         """The split that this asks for."""
         return Split(self.kind, self.seed, self.test_share, tuple(self.test_cameras))
 
 
-class VersionRequest(BaseModel):
+class VersionRequest(
+    RequestBody, examples=[{"name": "v1", "note": "For the benchmark", "split": {"kind": "match"}}]
+):
     """What to freeze, and as what."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={
-            "examples": [{"name": "v1", "note": "For the benchmark", "split": {"kind": "match"}}]
-        },
-    )
 
     name: Annotated[str, Field(min_length=1, max_length=100)] | None = Field(
         default=None, description="Unique in its dataset; null: the next free of v1, v2, ..."

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter, Query
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from app.features.webhooks import service as webhooks
 from app.features.webhooks.messages import CHOSEN, MessageKind
@@ -13,7 +13,7 @@ from app.features.webhooks.sender import LONGEST
 from app.features.webhooks.service import Delivery, Webhook
 from app.http.cursor import Before, Cursor, paged, parse_descending_cursor
 from app.http.deps import Actor, AppStore, DatasetPath, Id
-from app.http.documents import Document, ListDocument
+from app.http.documents import Document, ListDocument, RequestBody
 from app.http.permissions import Action, OwnedKind, may
 from app.http.problem import responses
 from app.http.route import UnstoredResponseRoute
@@ -28,24 +28,15 @@ router = APIRouter(
 )
 
 
-class NewWebhook(BaseModel):
+class NewWebhook(RequestBody, examples=[{"url": URL, "kinds": ["group.judged", "job.failed"]}]):
     """An address that shall be told."""
-
-    model_config = ConfigDict(
-        extra="forbid",
-        json_schema_extra={"examples": [{"url": URL, "kinds": ["group.judged", "job.failed"]}]},
-    )
 
     url: Url = Field(description="One that the operator of the server allows.")
     kinds: Kinds
 
 
-class WebhookEdit(BaseModel):
+class WebhookEdit(RequestBody, examples=[{"on": False}, {"kinds": ["job.done"]}]):
     """What changes of a webhook."""
-
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"on": False}, {"kinds": ["job.done"]}]}
-    )
 
     url: Url | None = None
     kinds: Kinds | None = None

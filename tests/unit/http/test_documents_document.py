@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError
 from app.features.groups.solution_schemas import FailingGate
 from app.features.policies.schemas import PolicyDocument
 from app.features.predictions.evaluation_routes import FrameList
-from app.http.documents import Document, encode_document
+from app.http.documents import Document, RequestBody, encode_document
 from app.json_text import Moment
 from app.soccer.policy import PAPER
 from app.soccer.solution import Gate
@@ -42,6 +42,24 @@ class TestDocument:
 
     def test_a_page_names_the_next_one_by_text(self) -> None:
         assert FrameList(items=[], next=50, total=51).next == "50"
+
+
+class Shot(RequestBody, examples=[{"first": 3}]):
+    first: int
+
+
+class ShotWithLast(Shot, examples=[{"first": 3, "last": 9}]):
+    last: int
+
+
+class TestRequestBody:
+    def test_refuses_what_it_does_not_know(self) -> None:
+        with pytest.raises(ValidationError, match="Extra inputs"):
+            ShotWithLast.model_validate({"first": 3, "last": 9, "lst": 9})
+
+    def test_has_its_own_examples_in_its_schema(self) -> None:
+        assert Shot.model_json_schema()["examples"] == [{"first": 3}]
+        assert ShotWithLast.model_json_schema()["examples"] == [{"first": 3, "last": 9}]
 
 
 @dataclass(frozen=True)
