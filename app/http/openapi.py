@@ -15,8 +15,8 @@ from starlette.responses import JSONResponse
 
 from app.http.cookies import SESSION
 from app.http.event_stream import EVENTS
-from app.http.permissions import Action, RoleScope, may
-from app.http.problem import Problem
+from app.http.permissions import Action, Permission, RoleScope, may
+from app.http.problem import Problem, responses
 from app.http.property_descriptions import PARAMETERS, PROPERTIES
 from app.http.route import Route, list_routes
 
@@ -325,11 +325,34 @@ def _complete_operations(document: dict[str, Any], routes: Mapping[str, Route]) 
                 if parameter["name"] == "If-Match":
                     parameter |= {"required": True, "schema": {"type": "string"}}
             named = {parameter["name"] for parameter in parameters}
-            kept = method != "get" and routes[f"{method.upper()} {path}"].stores_response
+            route = routes[f"{method.upper()} {path}"]
+            kept = method != "get" and route.stores_response
             if kept and KEY_PARAMETER["name"] not in named:
                 parameters.append(KEY_PARAMETER)
             for answer in operation["responses"].values():
                 answer.get("content", {}).get("text/event-stream", {}).pop("itemSchema", None)
+            operation["responses"].pop("422", None)
+            success, *others = operation["responses"].items()
+            refusals = _list_refusals(path, operation, route.permission)
+            refusals |= {int(status) for status, _ in others if int(status) >= 400}
+            known = {str(status): one for status, one in responses(*refusals).items()}
+            operation["responses"] = dict([success]) | known | dict(others)
+
+
+def _list_refusals(path: str, operation: Schema, permission: Permission) -> set[int]:
+    """The statuses with which an operation refuses, as far as it itself need not say.
+
+    Every one can meet a bad request (400), on a server of a team nobody logged in (401) or a role
+    that does not suffice (403, as for an Origin that is not ours), and a busy database (503).
+    """
+    found = {400, 401, 403, 422, 500, 503}
+    if "{" in path or permission.names or permission.body:
+        found |= {404}
+    if "requestBody" in operation:
+        found |= {413, 415}
+    if any(parameter["name"] == "If-Match" for parameter in operation["parameters"]):
+        found |= {412, 428}
+    return found
 
 
 def _format_summary(name: str) -> str:

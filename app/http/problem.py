@@ -132,15 +132,15 @@ def problem_response(
 
 
 def responses(*statuses: int) -> Responses:
-    """The ``responses`` of a route that may answer with these statuses, besides the common ones.
+    """The ``responses`` of a route that refuses with these statuses.
 
-    Every route can meet a bad request (400), on a server of a team nobody logged in (401) or a role
-    that does not suffice (403, as for an Origin that is not ours), a busy database (503); routes with a path or parameters can be asked for what is not there.
+    Those that follow from its address, its body and its headers are added to the OpenAPI document by
+    ``http/openapi.py``.
     """
     return {
         status: {
             "description": TITLES[status][1],
             "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}},
         }
-        for status in sorted({400, 401, 403, 422, 500, 503, *statuses})
+        for status in sorted(statuses)
     }

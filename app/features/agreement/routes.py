@@ -223,7 +223,6 @@ class Decision(RequestBody, examples=[{"annotation": 7}, {"annotation": 7, "as_s
     "/groups/{group}/comparison",
     operation_id="compareGroups",
     response_model=GroupComparisonDocument,
-    responses=responses(404),
 )
 @may(Action.READ, group=OwnedKind.GROUP, with_=OwnedKind.GROUP)
 @limit(COMPUTE)
@@ -240,7 +239,7 @@ def compare(
     )
 
 
-@router.get("/datasets/{dataset}/agreement", responses=responses(404))
+@router.get("/datasets/{dataset}/agreement")
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def get_agreement(
     dataset: DatasetPath, store: AppStore, of_batch: OfBatch = None
@@ -253,7 +252,6 @@ def get_agreement(
     "/datasets/{dataset}/agreement/groups.csv",
     response_class=Response,
     responses={
-        **responses(404),
         200: {"content": {CSV_FILE: {}}, "description": "A row for each group."},
     },
 )
@@ -265,11 +263,7 @@ def get_agreement_file(dataset: DatasetPath, store: AppStore, of_batch: OfBatch 
     return Response(text, headers=headers, media_type=CSV_FILE)
 
 
-@router.put(
-    "/datasets/{dataset}/agreement/limits",
-    response_model=AgreementLimits,
-    responses=responses(404, 413, 415),
-)
+@router.put("/datasets/{dataset}/agreement/limits", response_model=AgreementLimits)
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_document_response)
 def set_agreement_limits(
@@ -280,7 +274,7 @@ def set_agreement_limits(
     return limits.set_limits(store, dataset, wanted, actor=actor)
 
 
-@router.get("/datasets/{dataset}/adjudications", responses=responses(404))
+@router.get("/datasets/{dataset}/adjudications")
 @may(Action.REVIEW, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_waiting_groups(dataset: DatasetPath, store: AppStore) -> UndecidedGroupList:
@@ -288,7 +282,7 @@ def list_waiting_groups(dataset: DatasetPath, store: AppStore) -> UndecidedGroup
     return UndecidedGroupList.model_validate({"items": adjudicate.list_open_cases(store, dataset)})
 
 
-@router.get("/groups/{group}/adjudication", response_model=CaseDocument, responses=responses(404))
+@router.get("/groups/{group}/adjudication", response_model=CaseDocument)
 @may(Action.REVIEW, group=OwnedKind.GROUP)
 def get_adjudication(group: Id, store: AppStore, actor: Actor) -> Response:
     """The annotations of a group that disagree, beside each other."""
@@ -298,7 +292,7 @@ def get_adjudication(group: Id, store: AppStore, actor: Actor) -> Response:
 @router.post(
     "/groups/{group}/adjudication",
     response_model=GroupDocument,
-    responses={**responses(403, 404, 409, 413, 415), 200: {"headers": ETAG}},
+    responses={**responses(409), 200: {"headers": ETAG}},
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
 @respond_with(make_group_response)
@@ -316,11 +310,7 @@ def decide_adjudication(
     )
 
 
-@router.post(
-    "/groups/{group}/adjudication/return",
-    status_code=204,
-    responses=responses(403, 404, 409, 413, 415),
-)
+@router.post("/groups/{group}/adjudication/return", status_code=204, responses=responses(409))
 @may(Action.REVIEW, group=OwnedKind.GROUP)
 @respond_with(make_empty_response)
 def return_for_correction(

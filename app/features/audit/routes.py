@@ -23,7 +23,6 @@ from app.http.cursor import Before, Cursor, parse_descending_cursor
 from app.http.deps import AppStore
 from app.http.documents import ListDocument, encode_document
 from app.http.permissions import Action, OwnedKind, RoleScope, may
-from app.http.problem import responses
 from app.http.route import Route
 from app.json_text import MAX_ID
 
@@ -95,7 +94,7 @@ def _format_time(at: datetime | None) -> str | None:
 Asked = Annotated[AuditQuery, Depends(parse_audit_query)]
 
 
-@router.get("", response_model=AuditDocument, responses=responses(404))
+@router.get("", response_model=AuditDocument)
 @may(Action.LEAD, dataset=OwnedKind.DATASET, group=OwnedKind.GROUP, where=RoleScope.SOMEWHERE)
 def get_audit(
     store: AppStore,
@@ -125,7 +124,6 @@ def get_audit(
     "/export.{ending}",
     response_class=Response,
     responses={
-        **responses(404),
         200: {"content": {"text/csv": {}, "application/x-ndjson": {}}, "description": "The file."},
     },
 )

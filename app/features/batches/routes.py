@@ -260,7 +260,7 @@ def _announce_lease(services: Services, lease: Lease) -> Lease:
     return lease
 
 
-@router.get("/work", responses=responses())
+@router.get("/work")
 @may(Action.READ, where=RoleScope.SOMEWHERE)
 @paged()
 def get_my_work(store: AppStore, visibility: Sees, members: Members) -> MyWork:
@@ -270,7 +270,7 @@ def get_my_work(store: AppStore, visibility: Sees, members: Members) -> MyWork:
     )
 
 
-@router.get("/datasets/{dataset}/batches", responses=responses(404))
+@router.get("/datasets/{dataset}/batches")
 @may(Action.READ, dataset=OwnedKind.DATASET)
 @paged()
 def list_batches(dataset: DatasetPath, store: AppStore) -> WorkBatchList:
@@ -290,7 +290,7 @@ def _created_response(batch: Batch) -> Response:
     response_model=WorkBatchDocument,
     status_code=201,
     responses={
-        **responses(404, 409, 413, 415),
+        **responses(409),
         201: {
             "headers": {"Location": {"description": "Its address.", "schema": {"type": "string"}}},
             "description": "The batch.",
@@ -305,7 +305,7 @@ def make_batch(dataset: DatasetPath, new: NewBatchDocument, store: AppStore, act
     return batches.make_batch(store, dataset, wanted, actor=actor)
 
 
-@router.get("/datasets/{dataset}/team-work", responses=responses(404))
+@router.get("/datasets/{dataset}/team-work")
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @paged()
 def get_team_work(dataset: DatasetPath, store: AppStore) -> TeamWork:
@@ -317,16 +317,14 @@ def get_team_work(dataset: DatasetPath, store: AppStore) -> TeamWork:
     return TeamWork.model_validate({"items": items})
 
 
-@router.get("/batches/{batch}", response_model=WorkBatchDocument, responses=responses(404))
+@router.get("/batches/{batch}", response_model=WorkBatchDocument)
 @may(Action.READ, batch=OwnedKind.WORK)
 def get_batch(batch: Id, store: AppStore) -> Batch:
     """One batch."""
     return own_annotations.get_visible_batch(store, batch)
 
 
-@router.patch(
-    "/batches/{batch}", response_model=WorkBatchDocument, responses=responses(404, 409, 413, 415)
-)
+@router.patch("/batches/{batch}", response_model=WorkBatchDocument, responses=responses(409))
 @may(Action.LEAD, batch=OwnedKind.WORK)
 @respond_with(make_document_responder(WorkBatchDocument.model_validate))
 def change_batch(batch: Id, change: BatchEdit, store: AppStore, actor: Actor) -> Batch:
@@ -336,7 +334,7 @@ def change_batch(batch: Id, change: BatchEdit, store: AppStore, actor: Actor) ->
     return batches.change_batch(store, batch, actor=actor, never_due=never, no_gold=none, **values)
 
 
-@router.delete("/batches/{batch}", status_code=204, responses=responses(404))
+@router.delete("/batches/{batch}", status_code=204)
 @may(Action.LEAD, batch=OwnedKind.WORK)
 @respond_with(make_empty_response)
 def delete_batch(batch: Id, store: AppStore, actor: Actor) -> Batch:
@@ -344,7 +342,7 @@ def delete_batch(batch: Id, store: AppStore, actor: Actor) -> Batch:
     return batches.remove_batch(store, batch, actor=actor)
 
 
-@router.get("/batches/{batch}/groups", responses=responses(404))
+@router.get("/batches/{batch}/groups")
 @may(Action.READ, batch=OwnedKind.WORK, whole=True)
 @paged()
 def list_batch_groups(batch: Id, store: AppStore) -> BatchGroupList:
@@ -352,9 +350,7 @@ def list_batch_groups(batch: Id, store: AppStore) -> BatchGroupList:
     return BatchGroupList.model_validate({"items": batches.list_batch_groups(store, batch)})
 
 
-@router.post(
-    "/batches/{batch}/next", response_model=LeaseDocument, responses=responses(404, 409, 413, 415)
-)
+@router.post("/batches/{batch}/next", response_model=LeaseDocument, responses=responses(409))
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
 def open_next_group(
     batch: Id, origin: NextGroupRequest, services: AppServices, members: Members
@@ -370,9 +366,7 @@ def open_next_group(
 
 
 @router.put(
-    "/batches/{batch}/groups/{group}/lease",
-    response_model=LeaseDocument,
-    responses=responses(404, 409, 413, 415),
+    "/batches/{batch}/groups/{group}/lease", response_model=LeaseDocument, responses=responses(409)
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
 def open_group(
@@ -384,7 +378,7 @@ def open_group(
     return _announce_lease(services, lease)
 
 
-@router.delete("/batches/{batch}/groups/{group}/lease", status_code=204, responses=responses(404))
+@router.delete("/batches/{batch}/groups/{group}/lease", status_code=204)
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
 def release_group(batch: Id, group: Id, services: AppServices, members: Members) -> None:
     """Leave a group to others."""
@@ -395,7 +389,7 @@ def release_group(batch: Id, group: Id, services: AppServices, members: Members)
 @router.put(
     "/batches/{batch}/groups/{group}/submission",
     response_model=LeaseDocument,
-    responses=responses(404, 409, 413, 415),
+    responses=responses(409, 413, 415),
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
 @respond_with(make_document_responder(LeaseDocument.model_validate))
@@ -418,7 +412,7 @@ def submit_group(
 @router.delete(
     "/batches/{batch}/groups/{group}/submission",
     response_model=LeaseDocument,
-    responses=responses(404, 409),
+    responses=responses(409),
 )
 @may(Action.ANNOTATE, batch=OwnedKind.WORK)
 @respond_with(make_document_responder(LeaseDocument.model_validate))
@@ -432,9 +426,7 @@ def withdraw_submission(
 
 
 @router.post(
-    "/batches/{batch}/groups/{group}/return",
-    response_model=LeaseDocument,
-    responses=responses(404, 409, 413, 415),
+    "/batches/{batch}/groups/{group}/return", response_model=LeaseDocument, responses=responses(409)
 )
 @may(Action.REVIEW, batch=OwnedKind.WORK)
 @respond_with(make_document_responder(LeaseDocument.model_validate))

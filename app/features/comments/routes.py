@@ -118,14 +118,14 @@ class MentionablePeople(Document):
     names: list[str]
 
 
-@router.get("/people", responses=responses(404))
+@router.get("/people")
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 def list_people_of_group(group: Id, store: AppStore) -> MentionablePeople:
     """The people who can be mentioned in comments on the group: all who see it."""
     return MentionablePeople(names=comments.list_mentionable_people(store, group))
 
 
-@router.get("/threads", responses=responses(404))
+@router.get("/threads")
 @may(Action.READ, group=OwnedKind.GROUP)
 @paged()
 def list_threads(group: Id, store: AppStore, actor: Actor) -> ThreadList:
@@ -138,12 +138,7 @@ def _thread_response(thread: comments.StoredThread, actor: str, status: int = 20
     return make_document_response(ThreadDocument.of(thread, actor), status)
 
 
-@router.post(
-    "/threads",
-    response_model=ThreadDocument,
-    status_code=201,
-    responses=responses(404, 409, 413, 415),
-)
+@router.post("/threads", response_model=ThreadDocument, status_code=201, responses=responses(409))
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @respond_with(partial(_thread_response, status=201), "actor")
 def begin_thread(group: Id, new: NewThread, store: AppStore, actor: Actor) -> comments.StoredThread:
@@ -155,9 +150,7 @@ def begin_thread(group: Id, new: NewThread, store: AppStore, actor: Actor) -> co
     return comments.begin_thread(store, group, new.text, actor=actor, view=new.view, at=at)
 
 
-@router.patch(
-    "/threads/{thread}", response_model=ThreadDocument, responses=responses(404, 409, 413, 415)
-)
+@router.patch("/threads/{thread}", response_model=ThreadDocument, responses=responses(409))
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @respond_with(_thread_response, "actor")
 def change_thread(
@@ -171,7 +164,7 @@ def change_thread(
     "/threads/{thread}/comments",
     response_model=ThreadDocument,
     status_code=201,
-    responses=responses(404, 409, 413, 415),
+    responses=responses(409),
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @respond_with(partial(_thread_response, status=201), "actor")
@@ -183,9 +176,7 @@ def reply_to_thread(
 
 
 @router.patch(
-    "/threads/{thread}/comments/{comment}",
-    response_model=ThreadDocument,
-    responses=responses(403, 404, 409, 413, 415),
+    "/threads/{thread}/comments/{comment}", response_model=ThreadDocument, responses=responses(409)
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @respond_with(_thread_response, "actor")
@@ -196,9 +187,7 @@ def change_comment(
     return comments.edit_comment(store, group, thread, comment, new.text, actor=actor)
 
 
-@router.delete(
-    "/threads/{thread}/comments/{comment}", status_code=204, responses=responses(403, 404)
-)
+@router.delete("/threads/{thread}/comments/{comment}", status_code=204)
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @respond_with(make_empty_response)
 def delete_comment(group: Id, thread: Id, comment: Id, store: AppStore, actor: Actor) -> None:

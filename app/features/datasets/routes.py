@@ -117,7 +117,7 @@ class DeletionResultDocument(BaseModel):
     )
 
 
-@router.get("", responses=responses())
+@router.get("")
 @may(Action.READ, where=RoleScope.SOMEWHERE)
 @paged()
 def list_datasets(request: Request, store: AppStore, visibility: Sees) -> DatasetList:
@@ -127,14 +127,14 @@ def list_datasets(request: Request, store: AppStore, visibility: Sees) -> Datase
     return DatasetList(items=review.list_datasets(store, visibility, own))
 
 
-@router.get("/{dataset}", response_model=DatasetDocument, responses=responses(404))
+@router.get("/{dataset}", response_model=DatasetDocument)
 @may(Action.READ, dataset=OwnedKind.DATASET)
 def get_dataset(dataset: DatasetPath, store: AppStore) -> review.Dataset:
     """One dataset by name or id."""
     return review.get_dataset(store, dataset)
 
 
-@router.get("/{dataset}/summary", responses=responses(404))
+@router.get("/{dataset}/summary")
 @may(Action.READ, dataset=OwnedKind.DATASET)
 def get_summary(dataset: DatasetPath, store: AppStore, query: QueryText = "") -> SummaryDocument:
     """Progress and histograms over the groups that a query matches."""
@@ -143,7 +143,7 @@ def get_summary(dataset: DatasetPath, store: AppStore, query: QueryText = "") ->
     return SummaryDocument(progress=counted, histograms=counted.histograms)
 
 
-@router.post("/{dataset}/solve", **describe_job_response_for_openapi(404))
+@router.post("/{dataset}/solve", **describe_job_response_for_openapi())
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def solve_dataset(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
@@ -159,9 +159,7 @@ def _deleted_response(gone: DatasetContents, dry_run: bool) -> Response:
     return make_document_response(DeletionResultDocument(dry_run=dry_run, **vars(gone)))
 
 
-@router.delete(
-    "/{dataset}", response_model=DeletionResultDocument, responses=responses(404, 409, 413, 415)
-)
+@router.delete("/{dataset}", response_model=DeletionResultDocument, responses=responses(409))
 @may(Action.ADMINISTER, dataset=OwnedKind.DATASET)
 @respond_with(_deleted_response, "dry_run")
 def delete_dataset(

@@ -210,7 +210,7 @@ class ExportPage(ListDocument[ExportDocument]):
     """Exports, the newest first; ``next`` is the cursor of the next page."""
 
 
-@router.get("/datasets/{dataset}/export-formats", responses=responses(400, 404))
+@router.get("/datasets/{dataset}/export-formats")
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_export_formats(
@@ -242,7 +242,7 @@ def _export_job_response(job: Job) -> Response:
     "/exports",
     status_code=202,
     response_model=ExportJobDocument,
-    responses={**responses(404, 409, 413, 415, 507), **ACCEPTED},
+    responses={**responses(409, 507), **ACCEPTED},
 )
 @may(Action.EXPORT, body={"dataset": OwnedKind.DATASET}, whole=True)
 @respond_with(_export_job_response)
@@ -258,7 +258,7 @@ def make_export(request: ExportRequest, services: AppServices, actor: Actor) -> 
     )
 
 
-@router.get("/exports", responses=responses(404))
+@router.get("/exports")
 @may(Action.READ, dataset=OwnedKind.DATASET, where=RoleScope.SOMEWHERE, whole=True)
 def list_exports(
     services: AppServices,
@@ -284,7 +284,7 @@ def list_exports(
     return ExportPage(items=items, next=more)
 
 
-@router.get("/exports/{export}", responses=responses(404))
+@router.get("/exports/{export}")
 @may(Action.READ, export=OwnedKind.EXPORT)
 def get_export(export: ExportId, services: AppServices) -> ExportDocument:
     """An export: its request, progress and result."""
@@ -295,7 +295,7 @@ def get_export(export: ExportId, services: AppServices) -> ExportDocument:
     "/exports/{export}",
     status_code=204,
     response_class=Response,
-    responses={**responses(404, 409), 204: {"description": "It is gone."}},
+    responses={**responses(409), 204: {"description": "It is gone."}},
 )
 @may(Action.LEAD, export=OwnedKind.EXPORT)
 @respond_with(make_empty_response)
@@ -322,9 +322,7 @@ async def wait_for_export(export: ExportId, services: AppServices) -> str:
 
 
 @router.get(
-    "/exports/{export}/content",
-    response_class=FileResponse,
-    responses={**responses(404, 409, 503), **ZIP},
+    "/exports/{export}/content", response_class=FileResponse, responses={**responses(409), **ZIP}
 )
 @may(Action.READ, export=OwnedKind.EXPORT)
 @limit(TRANSFER)

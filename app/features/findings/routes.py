@@ -12,7 +12,6 @@ from app.features.queue.routes import FindingList, FindingRow
 from app.http.cursor import parse_cursor
 from app.http.deps import AppStore, DatasetQuery
 from app.http.permissions import Action, OwnedKind, may
-from app.http.problem import responses
 from app.http.route import Route
 from app.soccer.finding import FINDING_KINDS
 
@@ -22,7 +21,7 @@ FindingKind = Literal[FINDING_KINDS]  # type: ignore[valid-type]
 MAX_GROUPS = 200
 
 
-@router.get("", responses=responses(404))
+@router.get("")
 @may(Action.READ, dataset=OwnedKind.DATASET)
 def list_findings(
     store: AppStore,

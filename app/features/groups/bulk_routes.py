@@ -34,7 +34,6 @@ from app.http.documents import (
 )
 from app.http.errors import find_http_status
 from app.http.permissions import Action, OwnedKind, may
-from app.http.problem import responses
 from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
 from app.json_text import MAX_ID
@@ -195,12 +194,7 @@ class BulkEditDocument(Document):
         )
 
 
-@router.post(
-    "",
-    operation_id="editViews",
-    response_model=BulkEditDocument,
-    responses=responses(404, 413, 415),
-)
+@router.post("", operation_id="editViews", response_model=BulkEditDocument)
 @may(Action.ANNOTATE, dataset=OwnedKind.DATASET)
 @limit(COMPUTE)
 @respond_with(make_document_responder(BulkEditDocument.of))

@@ -65,8 +65,10 @@ router = APIRouter(prefix="/groups", tags=["groups"], route_class=Route)
 
 MAX_LIMIT = 500
 ETAG = {"ETag": {"description": "The group's state.", "schema": {"type": "string"}}}
-CHANGED: Responses = {200: {"headers": ETAG, "description": "The whole group as it is now."}}
-CONFLICTS = (404, 409, 412, 413, 415, 428)
+CHANGED: Responses = {
+    **responses(409),
+    200: {"headers": ETAG, "description": "The whole group as it is now."},
+}
 
 
 class ViewVersionDocument(Document):
@@ -146,7 +148,7 @@ def load_group_document_of_view(store: Store, view_id: int) -> GroupDocument:
     return GroupDocument.of(submit.load_solved_group_of_view(store, view_id))
 
 
-@router.get("", responses=responses(404))
+@router.get("")
 @may(Action.READ, dataset=OwnedKind.DATASET)
 def list_groups(
     store: AppStore,
@@ -186,7 +188,7 @@ def list_groups(
     return GroupPage(items=items, next=page.next, total=page.total)
 
 
-@router.get("/ids", responses=responses(404))
+@router.get("/ids")
 @may(Action.READ, dataset=OwnedKind.DATASET)
 def list_group_ids(
     store: AppStore,
@@ -207,7 +209,7 @@ def list_group_ids(
 @router.get(
     "/{group}",
     response_model=GroupDocument,
-    responses={**responses(404), 200: {"headers": ETAG}, 304: {"description": "Not changed."}},
+    responses={200: {"headers": ETAG}, 304: {"description": "Not changed."}},
 )
 @may(Action.READ, group=OwnedKind.GROUP)
 def get_group(group: Id, store: AppStore, request: Request) -> Response:
@@ -219,7 +221,7 @@ def get_group(group: Id, store: AppStore, request: Request) -> Response:
     return make_group_response(submit.load_solved_group(store, group))
 
 
-@router.get("/{group}/solution", responses=responses(404))
+@router.get("/{group}/solution")
 @may(Action.READ, group=OwnedKind.GROUP)
 def get_solution(group: Id, store: AppStore) -> SolutionDocument:
     """The solution of a group."""
@@ -229,14 +231,14 @@ def get_solution(group: Id, store: AppStore) -> SolutionDocument:
     return SolutionDocument.of(state.solution, state.group, state.dismissed)
 
 
-@router.get("/{group}/neighbours", response_model=Neighbours, responses=responses(404))
+@router.get("/{group}/neighbours", response_model=Neighbours)
 @may(Action.READ, group=OwnedKind.GROUP)
 def get_neighbours(group: Id, store: AppStore, query: QueryText = "") -> queue.Neighbours:
     """Where the group stands among those that match, and up to five before and after."""
     return queue.find_neighbours(store, group, query)
 
 
-@router.get("/{group}/history", responses=responses(404))
+@router.get("/{group}/history")
 @may(Action.READ, group=OwnedKind.GROUP)
 @paged()
 def get_history(group: Id, store: AppStore) -> GroupHistory:
@@ -244,16 +246,14 @@ def get_history(group: Id, store: AppStore) -> GroupHistory:
     return GroupHistory(items=[LogEntryDocument.of(entry) for entry in read_history(store, group)])
 
 
-@router.get("/{group}/history/{entry}", responses=responses(404))
+@router.get("/{group}/history/{entry}")
 @may(Action.READ, group=OwnedKind.GROUP)
 def get_history_step(group: Id, entry: Id, store: AppStore) -> EntryChangesDocument:
     """What one entry of the history has changed: the views that differ, before and after."""
     return EntryChangesDocument.of(read_entry_changes(store, group, entry))
 
 
-@router.post(
-    "/{group}/preview", response_model=PreviewDocument, responses=responses(404, 409, 413, 415)
-)
+@router.post("/{group}/preview", response_model=PreviewDocument, responses=responses(409))
 @may(Action.READ, group=OwnedKind.GROUP)
 @limit(COMPUTE)
 async def preview_group(
@@ -265,7 +265,7 @@ async def preview_group(
 
 
 @router.post(
-    "/{group}/undo", response_model=GroupDocument, responses={**responses(*CONFLICTS), **CHANGED}
+    "/{group}/undo", response_model=GroupDocument, responses={**CHANGED, **responses(413, 415)}
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @respond_with(make_group_response)
@@ -277,7 +277,7 @@ def undo_group(group: Id, services: AppServices, actor: Actor, if_match: IfMatch
 
 
 @router.post(
-    "/{group}/redo", response_model=GroupDocument, responses={**responses(*CONFLICTS), **CHANGED}
+    "/{group}/redo", response_model=GroupDocument, responses={**CHANGED, **responses(413, 415)}
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @respond_with(make_group_response)

@@ -21,7 +21,7 @@ from app.features.groups.edit import (
     make_set_ball_edit,
 )
 from app.features.groups.edit_schemas import BallEdit, LinesEdit, ViewEdit
-from app.features.groups.routes import CHANGED, CONFLICTS, load_group_document_of_view
+from app.features.groups.routes import CHANGED, load_group_document_of_view
 from app.features.groups.schemas import (
     GroupDocument,
     NeighbourFrameList,
@@ -80,9 +80,7 @@ FRAME: Responses = {
 }
 
 
-@router.patch(
-    "/{view}/lines", response_model=GroupDocument, responses={**responses(*CONFLICTS), **CHANGED}
-)
+@router.patch("/{view}/lines", response_model=GroupDocument, responses=CHANGED)
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
 @respond_with(make_group_response)
 def set_view_lines(
@@ -104,9 +102,7 @@ def set_view_lines(
     return _submit_view_edit(services, view, make_edit, if_match, actor, solve)
 
 
-@router.patch(
-    "/{view}/ball", response_model=GroupDocument, responses={**responses(*CONFLICTS), **CHANGED}
-)
+@router.patch("/{view}/ball", response_model=GroupDocument, responses=CHANGED)
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
 @respond_with(make_group_response)
 def set_view_ball(
@@ -129,9 +125,7 @@ def set_view_ball(
     )
 
 
-@router.patch(
-    "/{view}", response_model=GroupDocument, responses={**responses(*CONFLICTS), **CHANGED}
-)
+@router.patch("/{view}", response_model=GroupDocument, responses=CHANGED)
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
 @respond_with(make_group_response)
 def change_view(
@@ -165,9 +159,7 @@ def _submit_view_edit(
         )
 
 
-@router.get(
-    "/{view}/image", response_class=Response, responses={**responses(404, 413, 503), **FRAME}
-)
+@router.get("/{view}/image", response_class=Response, responses={**responses(413), **FRAME})
 @may(Action.READ, view=OwnedKind.VIEW)
 @limit(TRANSFER)
 async def get_image(
@@ -206,7 +198,7 @@ async def get_image(
     return Response(picture.data, media_type=picture.kind, headers=headers)
 
 
-@router.get("/{view}/neighbours", response_model=NeighbourFrameList, responses=responses(404, 503))
+@router.get("/{view}/neighbours", response_model=NeighbourFrameList)
 @may(Action.READ, view=OwnedKind.VIEW)
 @limit(TRANSFER)
 @paged()

@@ -26,7 +26,7 @@ router = APIRouter(
 Digest = Annotated[str, Path(pattern=r"^[0-9a-f]{64}$", description="SHA-256 of its bytes.")]
 
 
-@router.get("", response_model=Guidelines, responses=responses(404))
+@router.get("", response_model=Guidelines)
 @may(Action.READ, dataset=OwnedKind.DATASET)
 def get_guidelines(
     dataset: DatasetPath,
@@ -39,7 +39,7 @@ def get_guidelines(
     return guidelines.read_guidelines(store, dataset, number)
 
 
-@router.put("", response_model=Guidelines, responses=responses(404, 409, 413, 415))
+@router.put("", response_model=Guidelines, responses=responses(409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_document_response)
 def write_guidelines(
@@ -52,10 +52,7 @@ def write_guidelines(
 
 
 @router.post(
-    "/pictures",
-    response_model=GuidelinePictureDocument,
-    status_code=201,
-    responses=responses(404, 409, 413, 415, 503),
+    "/pictures", response_model=GuidelinePictureDocument, status_code=201, responses=responses(409)
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET, body={"upload": OwnedKind.UPLOAD})
 @respond_with(make_document_responder(GuidelinePictureDocument.model_validate, 201))
@@ -70,7 +67,6 @@ def add_guideline_picture(
     "/pictures/{digest}",
     response_class=Response,
     responses={
-        **responses(404),
         200: {
             "description": "The picture.",
             "content": {

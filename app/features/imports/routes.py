@@ -55,7 +55,7 @@ def list_import_folders(services: AppServices, path: FolderPath = "") -> FolderL
     return list_folder(services.settings, path)
 
 
-@imports_router.post("", **describe_job_response_for_openapi(404, 413, 415, 503))
+@imports_router.post("", **describe_job_response_for_openapi())
 @may(
     Action.LEAD,
     body={
@@ -140,7 +140,7 @@ BODY: dict[str, Any] = {
     status_code=201,
     openapi_extra=BODY,
     responses={
-        **responses(413, 415, 507),
+        **responses(507),
         201: {
             "description": "The file is on disk.",
             "headers": {"Location": {"description": "Of it.", "schema": {"type": "string"}}},
@@ -181,7 +181,7 @@ async def upload_file(
     return UploadDocument.model_validate(upload)
 
 
-@uploads_router.patch("/{upload}", openapi_extra=BODY, responses=responses(404, 409, 413, 415, 507))
+@uploads_router.patch("/{upload}", openapi_extra=BODY, responses=responses(409, 507))
 @may(Action.LEAD, upload=OwnedKind.UPLOAD)
 @limit(TRANSFER)
 async def send_part(
@@ -275,7 +275,7 @@ async def _run_in_disk_thread(work: Callable[..., T], *arguments: Any) -> T:
     return await to_thread.run_sync(work, *arguments, limiter=threads)
 
 
-@uploads_router.get("", responses=responses())
+@uploads_router.get("")
 @may(Action.LEAD, where=RoleScope.SOMEWHERE)
 @paged()
 def list_uploads(services: AppServices, visibility: Sees, actor: Actor) -> UploadList:
@@ -293,7 +293,7 @@ def list_uploads(services: AppServices, visibility: Sees, actor: Actor) -> Uploa
     )
 
 
-@uploads_router.get("/{upload}", responses=responses(404))
+@uploads_router.get("/{upload}")
 @may(Action.LEAD, upload=OwnedKind.UPLOAD)
 def get_upload(upload: UploadId, services: AppServices) -> UploadDocument:
     """One uploaded file, without its content."""
@@ -304,7 +304,7 @@ def get_upload(upload: UploadId, services: AppServices) -> UploadDocument:
     "/{upload}",
     status_code=204,
     response_class=Response,
-    responses={**responses(404), 204: {"description": "It is gone."}},
+    responses={204: {"description": "It is gone."}},
 )
 @may(Action.LEAD, upload=OwnedKind.UPLOAD)
 @respond_with(make_empty_response)

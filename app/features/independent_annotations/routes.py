@@ -160,7 +160,7 @@ class GuidelinePictureDocument(Document):
 annotations_router = APIRouter(tags=["independent annotations"], route_class=Route)
 
 
-@annotations_router.get("/datasets/{dataset}/independent-annotations", responses=responses(404))
+@annotations_router.get("/datasets/{dataset}/independent-annotations")
 @may(Action.READ, dataset=OwnedKind.DATASET)
 @paged()
 def list_independent_annotations(
@@ -187,7 +187,7 @@ def _begun_response(annotation: DisclosedAnnotation) -> Response:
     "/groups/{group}/independent-annotations",
     response_model=DisclosedAnnotation,
     status_code=201,
-    responses=responses(404, 409),
+    responses=responses(409),
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @respond_with(_begun_response)
@@ -199,9 +199,7 @@ def begin_independent_annotation(
 
 
 @annotations_router.get(
-    "/groups/{group}/independent-annotation",
-    response_model=DisclosedAnnotation,
-    responses=responses(404),
+    "/groups/{group}/independent-annotation", response_model=DisclosedAnnotation
 )
 @may(Action.READ, group=OwnedKind.GROUP)
 def get_independent_annotation(group: Id, store: AppStore) -> service.DisclosedAnnotation:
@@ -210,9 +208,7 @@ def get_independent_annotation(group: Id, store: AppStore) -> service.DisclosedA
 
 
 @annotations_router.post(
-    "/groups/{group}/submission",
-    response_model=DisclosedAnnotation,
-    responses=responses(403, 404, 409),
+    "/groups/{group}/submission", response_model=DisclosedAnnotation, responses=responses(409)
 )
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @respond_with(make_document_response)
@@ -227,9 +223,7 @@ def submit_independent_annotation(
 
 
 @annotations_router.post(
-    "/groups/{group}/return",
-    response_model=DisclosedAnnotation,
-    responses=responses(404, 409, 413, 415),
+    "/groups/{group}/return", response_model=DisclosedAnnotation, responses=responses(409)
 )
 @may(Action.LEAD, group=OwnedKind.GROUP)
 @respond_with(make_document_response)
@@ -247,7 +241,7 @@ def return_independent_annotation(
 @annotations_router.post(
     "/groups/{group}/adoption",
     response_model=GroupDocument,
-    responses={**responses(404, 409, 412), 200: {"headers": ETAG}},
+    responses={**responses(409, 412), 200: {"headers": ETAG}},
 )
 @may(Action.LEAD, group=OwnedKind.GROUP)
 @respond_with(make_group_response)
@@ -263,9 +257,7 @@ def adopt_independent_annotation(group: Id, services: AppServices, actor: Actor)
 gold_router = APIRouter(tags=["independent annotations"], route_class=Route)
 
 
-@gold_router.get(
-    "/datasets/{dataset}/gold", response_model=GoldReportDocument, responses=responses(404)
-)
+@gold_router.get("/datasets/{dataset}/gold", response_model=GoldReportDocument)
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def get_gold_report(dataset: DatasetPath, store: AppStore) -> gold.GoldReport:
     """The gold groups of a dataset, and what each person made of those that they were given."""
@@ -273,9 +265,7 @@ def get_gold_report(dataset: DatasetPath, store: AppStore) -> gold.GoldReport:
 
 
 @gold_router.post(
-    "/datasets/{dataset}/gold",
-    response_model=GoldChoiceResult,
-    responses=responses(404, 409, 413, 415),
+    "/datasets/{dataset}/gold", response_model=GoldChoiceResult, responses=responses(409)
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_document_response)
@@ -288,9 +278,7 @@ def choose_gold_groups(
     return mark_groups_with_known_truth(store, dataset, wanted, actor=actor)
 
 
-@gold_router.put(
-    "/groups/{group}/gold", response_model=GoldGroup, responses=responses(404, 409, 413, 415)
-)
+@gold_router.put("/groups/{group}/gold", response_model=GoldGroup, responses=responses(409))
 @may(Action.LEAD, group=OwnedKind.GROUP)
 @respond_with(make_document_response)
 def mark_gold(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
@@ -298,9 +286,7 @@ def mark_gold(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.
     return gold.mark_gold_group(store, group, edit.start, actor=actor)
 
 
-@gold_router.patch(
-    "/groups/{group}/gold", response_model=GoldGroup, responses=responses(404, 413, 415)
-)
+@gold_router.patch("/groups/{group}/gold", response_model=GoldGroup)
 @may(Action.LEAD, group=OwnedKind.GROUP)
 @respond_with(make_document_response)
 def change_gold(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gold.GoldGroup:
@@ -308,7 +294,7 @@ def change_gold(group: Id, edit: GoldEdit, store: AppStore, actor: Actor) -> gol
     return gold.set_gold_start(store, group, edit.start, actor=actor)
 
 
-@gold_router.delete("/groups/{group}/gold", response_model=GoldGroup, responses=responses(404))
+@gold_router.delete("/groups/{group}/gold", response_model=GoldGroup)
 @may(Action.LEAD, group=OwnedKind.GROUP)
 @respond_with(make_document_response)
 def unmark_gold(group: Id, store: AppStore, actor: Actor) -> gold.GoldGroup:

@@ -26,7 +26,7 @@ DatasetFilter = Annotated[
 ]
 
 
-@router.get("", responses=responses(404))
+@router.get("")
 @may(Action.READ, dataset=OwnedKind.DATASET, where=RoleScope.SOMEWHERE, whole=True)
 def list_jobs(
     services: AppServices,
@@ -51,14 +51,14 @@ def list_jobs(
     return JobPage(items=jobs[:limit], next=more)
 
 
-@router.get("/{job}", response_model=JobDocument, responses=responses(404))
+@router.get("/{job}", response_model=JobDocument)
 @may(Action.READ, job=OwnedKind.JOB)
 def get_job(job: Id, services: AppServices) -> Job:
     """A job as it stands."""
     return services.jobs.get(job)
 
 
-@router.delete("/{job}", response_model=JobDocument, responses=responses(404, 409))
+@router.delete("/{job}", response_model=JobDocument, responses=responses(409))
 @may(Action.LEAD, job=OwnedKind.JOB)
 @respond_with(make_document_responder(JobDocument.model_validate))
 def cancel_job(job: Id, services: AppServices, actor: Actor) -> Job:

@@ -163,7 +163,7 @@ class NoiseDocument(Document):
     notices: list[str] = Field(description="What a person should know.")
 
 
-@positions_router.get("", responses=responses(404))
+@positions_router.get("")
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_positions(dataset: DatasetPath, store: AppStore) -> SharedPositionsDocument:
@@ -171,7 +171,7 @@ def list_positions(dataset: DatasetPath, store: AppStore) -> SharedPositionsDocu
     return SharedPositionsDocument.model_validate(get_main_camera_positions(store, dataset))
 
 
-@positions_router.post("", **describe_job_response_for_openapi(404, 409, 413, 415))
+@positions_router.post("", **describe_job_response_for_openapi(409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def share_positions(
@@ -186,7 +186,7 @@ def share_positions(
     return POSITIONS.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
-@positions_router.delete("", **describe_job_response_for_openapi(404, 409))
+@positions_router.delete("", **describe_job_response_for_openapi(409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def revert_positions(
@@ -202,7 +202,7 @@ def revert_positions(
     return POSITIONS.undo_last_job(services.jobs, services.store, dataset, match, actor=actor)
 
 
-@rig_router.post("/datasets/{dataset}/rig", **describe_job_response_for_openapi(404, 409, 413, 415))
+@rig_router.post("/datasets/{dataset}/rig", **describe_job_response_for_openapi(409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def adjust_rig(
@@ -228,9 +228,7 @@ def _make_take_back_response(count: int) -> Response:
     return make_document_response(RigTakenBack(taken_back=count))
 
 
-@rig_router.delete(
-    "/datasets/{dataset}/rig", response_model=RigTakenBack, responses=responses(404, 409)
-)
+@rig_router.delete("/datasets/{dataset}/rig", response_model=RigTakenBack, responses=responses(409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(_make_take_back_response)
 def revert_rig(dataset: DatasetPath, services: AppServices, actor: Actor) -> int:
@@ -238,7 +236,7 @@ def revert_rig(dataset: DatasetPath, services: AppServices, actor: Actor) -> int
     return undo_rig_adjustment(services.jobs, services.store, dataset, actor=actor)
 
 
-@noise_router.get("", response_model=NoiseDocument, responses=responses(404))
+@noise_router.get("", response_model=NoiseDocument)
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @limit(COMPUTE)
 def get_noise(dataset: DatasetPath, services: AppServices) -> noises.NoiseReport:
@@ -250,7 +248,7 @@ def get_noise(dataset: DatasetPath, services: AppServices) -> noises.NoiseReport
     return services.noises.read(dataset)
 
 
-@noise_router.post("", **describe_job_response_for_openapi(404, 412))
+@noise_router.post("", **describe_job_response_for_openapi(412))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @limit(COMPUTE)
 @respond_with(make_job_response)
@@ -270,7 +268,7 @@ def accept_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> J
     )
 
 
-@noise_router.delete("", **describe_job_response_for_openapi(404))
+@noise_router.delete("", **describe_job_response_for_openapi())
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @limit(COMPUTE)
 @respond_with(make_job_response)
@@ -288,7 +286,7 @@ def revert_noise(dataset: DatasetPath, services: AppServices, actor: Actor) -> J
     )
 
 
-@pictures_router.get("", responses=responses(404))
+@pictures_router.get("")
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_match_pictures(dataset: DatasetPath, store: AppStore) -> MatchPictureGeometriesDocument:
@@ -298,7 +296,7 @@ def list_match_pictures(dataset: DatasetPath, store: AppStore) -> MatchPictureGe
     )
 
 
-@pictures_router.post("", **describe_job_response_for_openapi(404, 413, 415))
+@pictures_router.post("", **describe_job_response_for_openapi())
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def estimate_match_pictures(
@@ -312,7 +310,7 @@ def estimate_match_pictures(
     return PICTURES.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
-@pictures_router.patch("", **describe_job_response_for_openapi(404, 413, 415))
+@pictures_router.patch("", **describe_job_response_for_openapi())
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def set_match_picture(

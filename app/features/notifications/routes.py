@@ -37,7 +37,7 @@ class SeenNotifications(RequestBody, examples=[{"ids": [12, 15]}, {"ids": None}]
     )
 
 
-@router.get("", responses=responses(401, 409))
+@router.get("", responses=responses(409))
 @may(Action.ACCOUNT)
 def get_notifications(
     store: AppStore,
@@ -56,7 +56,7 @@ def get_notifications(
     return document
 
 
-@router.post("/read", response_model=NotificationsDocument, responses=responses(401, 409, 413, 415))
+@router.post("/read", response_model=NotificationsDocument, responses=responses(409))
 @may(Action.ACCOUNT)
 @respond_with(make_document_responder(NotificationsDocument.model_validate))
 def mark_notifications_read(

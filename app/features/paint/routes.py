@@ -56,7 +56,6 @@ DIGITS = 3
 """Of a pixel: what lies below is far less than any sigma."""
 paint_router = APIRouter(prefix="/datasets/{dataset}/paint", tags=["datasets"], route_class=Route)
 view_paint_router = APIRouter(prefix="/views", tags=["views"], route_class=Route)
-REFUSALS = (404, 409, 413, 415, 503)
 proposals_router = APIRouter(tags=["datasets"], route_class=Route)
 
 
@@ -185,7 +184,7 @@ class GroupProposals(ListDocument[GroupViewProposal]):
     """What was proposed for the views of a group, in their order."""
 
 
-@paint_router.get("", responses=responses(404))
+@paint_router.get("")
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_dataset_paint(dataset: DatasetPath, store: AppStore) -> DatasetPaintDocument:
@@ -193,7 +192,7 @@ def list_dataset_paint(dataset: DatasetPath, store: AppStore) -> DatasetPaintDoc
     return DatasetPaintDocument.model_validate(summarize_paint_readings(store, dataset))
 
 
-@paint_router.post("", **describe_job_response_for_openapi(404, 409, 413, 415))
+@paint_router.post("", **describe_job_response_for_openapi(409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def read_dataset_paint(
@@ -207,7 +206,7 @@ def read_dataset_paint(
     return PAINT.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
-@paint_router.delete("", **describe_job_response_for_openapi(404, 409))
+@paint_router.delete("", **describe_job_response_for_openapi(409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def revert_dataset_paint(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
@@ -219,9 +218,7 @@ def revert_dataset_paint(dataset: DatasetPath, services: AppServices, actor: Act
     return PAINT.undo_last_job(services.jobs, services.store, dataset, actor=actor)
 
 
-@view_paint_router.post(
-    "/{view}/paint", response_model=PaintDocument, responses=responses(*REFUSALS)
-)
+@view_paint_router.post("/{view}/paint", response_model=PaintDocument, responses=responses(409))
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
 @limit(TRANSFER)
 async def read_paint(
@@ -237,9 +234,7 @@ async def read_paint(
     return Response(status_code=CLIENT_GONE) if found is None else PaintDocument.of(found)
 
 
-@view_paint_router.post(
-    "/{view}/propose", response_model=ProposalDocument, responses=responses(404, 413, 415, 503)
-)
+@view_paint_router.post("/{view}/propose", response_model=ProposalDocument)
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
 @limit(TRANSFER)
 async def propose_lines(
@@ -265,7 +260,7 @@ async def _wait_for_result(
         return await ask().result_unless_client_gone(request.is_disconnected)
 
 
-@proposals_router.get("/datasets/{dataset}/proposals", responses=responses(404))
+@proposals_router.get("/datasets/{dataset}/proposals")
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_dataset_proposals(dataset: DatasetPath, store: AppStore) -> DatasetProposalCountsDocument:
@@ -278,7 +273,6 @@ def list_dataset_proposals(dataset: DatasetPath, store: AppStore) -> DatasetProp
     status_code=202,
     response_model=JobDocument,
     responses={
-        **responses(404, 413, 415),
         **ACCEPTED,
         200: {
             "model": ProposalPlanDocument,
@@ -313,11 +307,7 @@ def _make_forgotten_response(gone: int) -> Response:
     return make_document_response(ForgottenProposalsDocument(forgotten=gone))
 
 
-@proposals_router.delete(
-    "/datasets/{dataset}/proposals",
-    response_model=ForgottenProposalsDocument,
-    responses=responses(404),
-)
+@proposals_router.delete("/datasets/{dataset}/proposals", response_model=ForgottenProposalsDocument)
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(_make_forgotten_response)
 def forget_dataset_proposals(dataset: DatasetPath, services: AppServices) -> int:
@@ -329,10 +319,7 @@ def forget_dataset_proposals(dataset: DatasetPath, services: AppServices) -> int
 
 
 @proposals_router.get(
-    "/groups/{group}/proposals",
-    operation_id="getGroupProposals",
-    tags=["groups"],
-    responses=responses(404),
+    "/groups/{group}/proposals", operation_id="getGroupProposals", tags=["groups"]
 )
 @may(Action.READ, group=OwnedKind.GROUP)
 @paged()

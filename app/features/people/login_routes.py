@@ -42,7 +42,7 @@ OWN_PASSKEYS = "/session/passkeys"
 log = structlog.get_logger("touchline.access")
 
 
-@passkeys_router.get(OWN_PASSKEYS, responses=responses(401, 409))
+@passkeys_router.get(OWN_PASSKEYS, responses=responses(409))
 @may(Action.ACCOUNT, to_enrol=True)
 @paged()
 def list_passkeys(request: Request, team: AppTeam, me: Me) -> PasskeyList:
@@ -57,7 +57,7 @@ def list_passkeys(request: Request, team: AppTeam, me: Me) -> PasskeyList:
     return PasskeyList(items=items, unavailable=unavailable)
 
 
-@passkeys_router.post(f"{OWN_PASSKEYS}/begin", responses=responses(401, 409, 413, 415, 429))
+@passkeys_router.post(f"{OWN_PASSKEYS}/begin", responses=responses(409, 429))
 @may(Action.ACCOUNT, to_enrol=True)
 def begin_passkey(
     body: PasswordOnly, request: Request, team: AppTeam, me: Me
@@ -70,7 +70,7 @@ def begin_passkey(
     )
 
 
-@passkeys_router.post(OWN_PASSKEYS, status_code=201, responses=responses(401, 409, 413, 415))
+@passkeys_router.post(OWN_PASSKEYS, status_code=201, responses=responses(409))
 @may(Action.ACCOUNT, to_enrol=True)
 def create_passkey(new: NewPasskey, request: Request, team: AppTeam, me: Me) -> PasskeyMade:
     """Keep a passkey that the browser has made; every other session ends. It is a second factor, too."""
@@ -80,9 +80,7 @@ def create_passkey(new: NewPasskey, request: Request, team: AppTeam, me: Me) -> 
 
 
 @passkeys_router.delete(
-    f"{OWN_PASSKEYS}/{{passkey}}",
-    status_code=204,
-    responses=responses(401, 404, 409, 413, 415, 429),
+    f"{OWN_PASSKEYS}/{{passkey}}", status_code=204, responses=responses(409, 429)
 )
 @may(Action.ACCOUNT)
 def delete_passkey(
@@ -107,7 +105,7 @@ def begin_passkey_login(
     return PasskeyRequestOptions(options=options)
 
 
-@passkeys_router.post("/session/passkey", responses=responses(401, 409, 413, 415, 429))
+@passkeys_router.post("/session/passkey", responses=responses(409, 429))
 @open_to_all
 def create_session_with_passkey(
     body: PasskeyLogin, request: Request, response: Response, store: AppStore, team: AppTeam
@@ -136,14 +134,14 @@ team_router = APIRouter(tags=["sessions"], route_class=Route)
 OWN_FACTOR = "/session/second-factor"
 
 
-@second_factors_router.get(OWN_FACTOR, responses=responses(401, 409))
+@second_factors_router.get(OWN_FACTOR, responses=responses(409))
 @may(Action.ACCOUNT, to_enrol=True)
 def get_second_factor(team: AppTeam, me: Me) -> FactorState:
     """Whether a code is asked for after one's password, and how many recovery codes are left."""
     return team.factors.state(me.person_id)
 
 
-@second_factors_router.post(OWN_FACTOR, responses=responses(401, 409, 413, 415, 429))
+@second_factors_router.post(OWN_FACTOR, responses=responses(409, 429))
 @may(Action.ACCOUNT, to_enrol=True)
 def begin_second_factor(body: PasswordOnly, request: Request, team: AppTeam, me: Me) -> Enrolment:
     """What an authenticator has to know, shown this once; nothing is asked for before it is confirmed."""
@@ -151,9 +149,7 @@ def begin_second_factor(body: PasswordOnly, request: Request, team: AppTeam, me:
     return team.factors.begin(me, body.password)
 
 
-@second_factors_router.post(
-    f"{OWN_FACTOR}/confirm", responses=responses(401, 404, 409, 413, 415, 429)
-)
+@second_factors_router.post(f"{OWN_FACTOR}/confirm", responses=responses(404, 409, 429))
 @may(Action.ACCOUNT, to_enrol=True)
 def confirm_second_factor(body: CodeOnly, team: AppTeam, me: Me) -> RecoveryCodes:
     """Ask for a code from now on; every other session ends. The recovery codes are shown this once."""
@@ -161,9 +157,7 @@ def confirm_second_factor(body: CodeOnly, team: AppTeam, me: Me) -> RecoveryCode
     return RecoveryCodes(codes=team.factors.confirm(me, body.code))
 
 
-@second_factors_router.delete(
-    OWN_FACTOR, status_code=204, responses=responses(401, 409, 413, 415, 429)
-)
+@second_factors_router.delete(OWN_FACTOR, status_code=204, responses=responses(409, 429))
 @may(Action.ACCOUNT, to_enrol=True)
 def delete_second_factor(body: PasswordOnly, request: Request, team: AppTeam, me: Me) -> None:
     """Stop asking for a code; 409 where everybody needs a second factor."""
@@ -172,7 +166,7 @@ def delete_second_factor(body: PasswordOnly, request: Request, team: AppTeam, me
 
 
 @second_factors_router.delete(
-    "/users/{user}/second-factor", status_code=204, responses=responses(401, 404, 409)
+    "/users/{user}/second-factor", status_code=204, responses=responses(409)
 )
 @may(Action.ADMINISTER)
 def delete_second_factor_of_user(user: Id, team: AppTeam, me: Me) -> None:
@@ -180,14 +174,14 @@ def delete_second_factor_of_user(user: Id, team: AppTeam, me: Me) -> None:
     team.factors.clear(user, actor=me.actor)
 
 
-@team_router.get("/team", responses=responses(401, 409))
+@team_router.get("/team", responses=responses(409))
 @may(Action.ADMINISTER)
 def get_team(team: AppTeam, _me: Me) -> TeamSettings:
     """What counts for everybody."""
     return TeamSettings(require_second_factor=team.factors.required())
 
 
-@team_router.put("/team", responses=responses(401, 409, 413, 415))
+@team_router.put("/team", responses=responses(409))
 @may(Action.ADMINISTER)
 def change_team(wanted: TeamSettings, team: AppTeam, me: Me) -> TeamSettings:
     """Let everybody need a second factor, or not; whoever has none makes one before anything else."""
@@ -198,7 +192,7 @@ def change_team(wanted: TeamSettings, team: AppTeam, me: Me) -> TeamSettings:
 tokens_router = APIRouter(prefix="/tokens", tags=["tokens"], route_class=UnstoredResponseRoute)
 
 
-@tokens_router.get("", responses=responses(401, 409))
+@tokens_router.get("", responses=responses(409))
 @may(Action.ACCOUNT)
 @paged()
 def list_tokens(team: AppTeam, me: Me) -> AccessTokenList:
@@ -206,7 +200,7 @@ def list_tokens(team: AppTeam, me: Me) -> AccessTokenList:
     return AccessTokenList(items=team.tokens.list_of_person(me.person_id))
 
 
-@tokens_router.post("", status_code=201, responses=responses(401, 404, 409, 413, 415))
+@tokens_router.post("", status_code=201, responses=responses(409))
 @may(Action.ACCOUNT, body={"dataset": OwnedKind.DATASET})
 def make_token(new: NewAccessToken, store: AppStore, team: AppTeam, me: Me) -> MadeAccessToken:
     """Make a token for a script of one's own; its text is shown this once, and kept nowhere."""
@@ -215,7 +209,7 @@ def make_token(new: NewAccessToken, store: AppStore, team: AppTeam, me: Me) -> M
     return MadeAccessToken(token=AccessTokenDocument.model_validate(made), text=text)
 
 
-@tokens_router.delete("/{token}", status_code=204, responses=responses(401, 404, 409))
+@tokens_router.delete("/{token}", status_code=204, responses=responses(409))
 @may(Action.ACCOUNT)
 def end_token(token: Id, team: AppTeam, me: Me) -> None:
     """End a token of one's own: whatever uses it is refused from now on."""

@@ -50,7 +50,7 @@ def _user_with_link(person: Person, row: InvitationOutcome) -> UserWithLink:
     )
 
 
-@users_router.get("", responses=responses(401, 409))
+@users_router.get("", responses=responses(409))
 @may(Action.ADMINISTER)
 @paged()
 def list_users(store: AppStore, team: AppTeam, _me: Me) -> UserList:
@@ -65,7 +65,7 @@ def _list_users(store: Store, team: TeamLogin) -> UserList:
     )
 
 
-@users_router.post("", status_code=201, responses=responses(401, 409, 413, 415))
+@users_router.post("", status_code=201, responses=responses(409))
 @may(Action.ADMINISTER)
 def invite_user(
     new: NewUser, request: Request, store: AppStore, team: AppTeam, me: Me
@@ -80,7 +80,7 @@ def invite_user(
     return _user_with_link(person, row)
 
 
-@users_router.post("/invitations", responses=responses(401, 409, 413, 415))
+@users_router.post("/invitations", responses=responses(409))
 @may(Action.ADMINISTER)
 def invite_users(
     wanted: InvitationList,
@@ -113,7 +113,7 @@ def _make_mailer(team: TeamLogin, request: Request) -> LinkMailer:
     return LinkMailer(team.mail, team.url, team.get_base_url(request))
 
 
-@users_router.patch("/{user}", response_model=Person, responses=responses(401, 404, 409, 413, 415))
+@users_router.patch("/{user}", response_model=Person, responses=responses(409))
 @may(Action.ADMINISTER)
 def change_user(user: Id, change: UserEdit, store: AppStore, _team: AppTeam, me: Me) -> Person:
     """Give somebody another role, disable or enable them; who is disabled is logged out.
@@ -125,7 +125,7 @@ def change_user(user: Id, change: UserEdit, store: AppStore, _team: AppTeam, me:
     )
 
 
-@users_router.post("/{user}/link", responses=responses(401, 404, 409, 413, 415))
+@users_router.post("/{user}/link", responses=responses(409))
 @may(Action.ADMINISTER)
 def renew_user_link(
     user: Id,
@@ -146,7 +146,7 @@ def renew_user_link(
     )
 
 
-@users_router.post("/{user}/adoption", responses=responses(401, 404, 409))
+@users_router.post("/{user}/adoption", responses=responses(409))
 @may(Action.ADMINISTER)
 def adopt_local_work(user: Id, store: AppStore, team: AppTeam, me: Me) -> UserList:
     """Show what was done before there were accounts, under the name `local`, as somebody's; once.
@@ -157,7 +157,7 @@ def adopt_local_work(user: Id, store: AppStore, team: AppTeam, me: Me) -> UserLi
     return _list_users(store, team)
 
 
-@users_router.get("/{user}/tokens", responses=responses(401, 404, 409))
+@users_router.get("/{user}/tokens", responses=responses(409))
 @may(Action.ADMINISTER)
 @paged()
 def list_tokens_of_user(user: Id, store: AppStore, team: AppTeam, _me: Me) -> AccessTokenList:
@@ -166,7 +166,7 @@ def list_tokens_of_user(user: Id, store: AppStore, team: AppTeam, _me: Me) -> Ac
     return AccessTokenList(items=team.tokens.list_of_person(person.id))
 
 
-@users_router.delete("/{user}/tokens/{token}", status_code=204, responses=responses(401, 404, 409))
+@users_router.delete("/{user}/tokens/{token}", status_code=204, responses=responses(409))
 @may(Action.ADMINISTER)
 def end_token_of_user(user: Id, token: Id, team: AppTeam, me: Me) -> None:
     """End a token of somebody: whatever uses it is refused from now on."""
@@ -176,7 +176,7 @@ def end_token_of_user(user: Id, token: Id, team: AppTeam, me: Me) -> None:
 members_router = APIRouter(prefix="/datasets/{dataset}/members", tags=["users"], route_class=Route)
 
 
-@members_router.get("", responses=responses(401, 404, 409))
+@members_router.get("", responses=responses(409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @paged()
 def list_members(dataset: DatasetPath, store: AppStore, _team: AppTeam, _me: Me) -> DatasetRoleList:
@@ -184,9 +184,7 @@ def list_members(dataset: DatasetPath, store: AppStore, _team: AppTeam, _me: Me)
     return DatasetRoleList(items=people.list_members(store, dataset))
 
 
-@members_router.put(
-    "/{user}", response_model=MemberDocument, responses=responses(401, 404, 409, 413, 415)
-)
+@members_router.put("/{user}", response_model=MemberDocument, responses=responses(409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def set_member_role(
     dataset: DatasetPath, user: Id, change: MemberEdit, store: AppStore, _team: AppTeam, me: Me

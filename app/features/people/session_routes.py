@@ -92,7 +92,7 @@ def make_session_document(login: Login | None, store: Store) -> SessionDocument:
     )
 
 
-@router.get("/session", responses=responses(401, 429))
+@router.get("/session", responses=responses(429))
 @open_to_all
 def get_session(request: Request, services: AppServices) -> SessionDocument:
     """The person of the request, empty before the login. With a token: its owner and its scopes."""
@@ -120,7 +120,7 @@ def get_session(request: Request, services: AppServices) -> SessionDocument:
     return found.model_copy(update=more)
 
 
-@router.post("/session", responses=responses(401, 409, 413, 415, 429))
+@router.post("/session", responses=responses(409, 429))
 @open_to_all
 @limit(TRANSFER)
 def create_session(
@@ -198,7 +198,7 @@ def delete_session(
     return make_session_document(None, store)
 
 
-@router.put("/session/password", responses=responses(401, 409, 413, 415, 429))
+@router.put("/session/password", responses=responses(409, 429))
 @may(Action.ACCOUNT, to_enrol=True)
 @limit(TRANSFER)
 def change_password(
@@ -216,7 +216,7 @@ def change_password(
     return give_session(team, store, request, response, token)
 
 
-@router.get("/sessions", responses=responses(401, 409))
+@router.get("/sessions", responses=responses(409))
 @may(Action.ACCOUNT)
 @paged()
 def list_sessions(team: AppTeam, me: Me) -> OpenSessionList:
@@ -228,21 +228,21 @@ def list_sessions(team: AppTeam, me: Me) -> OpenSessionList:
     return OpenSessionList(items=items)
 
 
-@router.delete("/sessions", status_code=204, responses=responses(401, 409))
+@router.delete("/sessions", status_code=204, responses=responses(409))
 @may(Action.ACCOUNT)
 def delete_other_sessions(team: AppTeam, me: Me) -> None:
     """End every session of one's own but this one."""
     team.logins.end_others(me)
 
 
-@router.delete("/sessions/{session}", status_code=204, responses=responses(401, 404, 409))
+@router.delete("/sessions/{session}", status_code=204, responses=responses(409))
 @may(Action.ACCOUNT)
 def end_session(session: Id, team: AppTeam, me: Me) -> None:
     """End a session of one's own."""
     team.logins.end(me, session)
 
 
-@router.post("/links/look", responses=responses(404, 409, 413, 415, 429))
+@router.post("/links/look", responses=responses(404, 409, 429))
 @open_to_all
 def read_link(asked: LinkToken, request: Request, store: AppStore, team: AppTeam) -> LinkHolder:
     """The person a link is for; 404 where it is no longer valid."""
@@ -250,7 +250,7 @@ def read_link(asked: LinkToken, request: Request, store: AppStore, team: AppTeam
     return LinkHolder(**vars(links.find_link_holder(store, asked.token)))
 
 
-@router.post("/links/use", responses=responses(401, 404, 409, 413, 415, 429))
+@router.post("/links/use", responses=responses(404, 409, 429))
 @open_to_all
 @limit(TRANSFER)
 def use_link(
@@ -267,7 +267,7 @@ def use_link(
     return _begin_session(team, store, request, response, name, chosen.password)
 
 
-@sign_on_router.post("/session/sign-on/begin", responses=responses(404, 409, 413, 415, 429))
+@sign_on_router.post("/session/sign-on/begin", responses=responses(404, 409, 429))
 @open_to_all
 @limit(TRANSFER)
 def begin_sign_on(
@@ -288,7 +288,7 @@ def begin_sign_on(
     return SignOnStarted(address=address)
 
 
-@sign_on_router.post("/session/sign-on", responses=responses(401, 404, 409, 413, 415, 429))
+@sign_on_router.post("/session/sign-on", responses=responses(404, 409, 429))
 @open_to_all
 @limit(TRANSFER)
 def create_session_by_sign_on(
@@ -327,7 +327,7 @@ def create_session_by_sign_on(
     )
 
 
-@sign_on_router.get("/session/identity", responses=responses(401, 409))
+@sign_on_router.get("/session/identity", responses=responses(409))
 @may(Action.ACCOUNT)
 def get_identity(store: AppStore, team: AppTeam, me: Me) -> OwnLoginMethods:
     """How one can come in: whether there is a password, and which account of the provider is one's own."""
@@ -340,7 +340,7 @@ def get_identity(store: AppStore, team: AppTeam, me: Me) -> OwnLoginMethods:
     )
 
 
-@sign_on_router.post("/session/identity/begin", responses=responses(401, 409, 413, 415, 429))
+@sign_on_router.post("/session/identity/begin", responses=responses(409, 429))
 @may(Action.ACCOUNT)
 @limit(TRANSFER)
 def begin_identity(
@@ -357,9 +357,7 @@ def begin_identity(
     return SignOnStarted(address=address)
 
 
-@sign_on_router.delete(
-    "/session/identity", status_code=204, responses=responses(401, 404, 409, 413, 415, 429)
-)
+@sign_on_router.delete("/session/identity", status_code=204, responses=responses(404, 409, 429))
 @may(Action.ACCOUNT)
 def delete_identity(
     body: PasswordOnly, request: Request, store: AppStore, team: AppTeam, me: Me
@@ -370,7 +368,7 @@ def delete_identity(
 
 
 @sign_on_router.delete(
-    "/users/{user}/identity", status_code=204, tags=["users"], responses=responses(401, 404, 409)
+    "/users/{user}/identity", status_code=204, tags=["users"], responses=responses(409)
 )
 @may(Action.ADMINISTER)
 def delete_identity_of_user(user: Id, store: AppStore, _team: AppTeam, me: Me) -> None:

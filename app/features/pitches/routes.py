@@ -29,7 +29,7 @@ from app.http.documents import (
 )
 from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, RoleScope, may
-from app.http.problem import Responses, responses
+from app.http.problem import Responses
 from app.http.route import Route
 from app.soccer.pitch import LENGTH_RANGE, WIDTH_RANGE, Arc, Pitch, Segment, opposite_marking
 from app.solving.pitch_size import PitchEstimate
@@ -124,7 +124,7 @@ class PitchChange(RequestBody, examples=[{"match": "a/b/c", "length": 103.0, "wi
     width: Annotated[float, Field(ge=WIDTH_RANGE[0], le=WIDTH_RANGE[1])]
 
 
-@pitch_router.get("/pitch", responses=responses())
+@pitch_router.get("/pitch")
 @may(Action.READ, where=RoleScope.SOMEWHERE)
 def get_pitch(
     length: Annotated[float, Query(ge=LENGTH_RANGE[0], le=LENGTH_RANGE[1])] = 105.0,
@@ -134,7 +134,7 @@ def get_pitch(
     return PitchDocument.of(Pitch(length, width))
 
 
-@pitches_router.get("", responses={**responses(404), 200: {"headers": TAGGED}})
+@pitches_router.get("", responses={200: {"headers": TAGGED}})
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_pitches(dataset: DatasetPath, store: AppStore, response: Response) -> PitchesDocument:
@@ -148,7 +148,7 @@ def list_pitches(dataset: DatasetPath, store: AppStore, response: Response) -> P
     return PitchesDocument.model_validate(state)
 
 
-@pitches_router.post("", **describe_job_response_for_openapi(404))
+@pitches_router.post("", **describe_job_response_for_openapi())
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def estimate_pitches(dataset: DatasetPath, services: AppServices, actor: Actor) -> Job:
@@ -170,12 +170,7 @@ def _make_pitch_job_response(sized: PitchesAndJob) -> Response:
     )
 
 
-@pitches_router.patch(
-    "",
-    status_code=202,
-    response_model=JobDocument,
-    responses={**responses(404, 412, 413, 415, 428), **CHANGED},
-)
+@pitches_router.patch("", status_code=202, response_model=JobDocument, responses=CHANGED)
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(_make_pitch_job_response)
 def set_pitch(

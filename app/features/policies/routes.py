@@ -25,7 +25,7 @@ from app.http.deps import Actor, AppServices, AppStore, DatasetPath, IfMatch
 from app.http.documents import make_document_response, respond_with
 from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, RoleScope, may
-from app.http.problem import Responses, responses
+from app.http.problem import Responses
 from app.http.route import Route
 from app.soccer.policy import POLICIES, Policy
 from app.soccer.thresholds import THRESHOLDS
@@ -42,7 +42,7 @@ CHANGED: Responses = {
 }
 
 
-@router.get("/policies", responses=responses())
+@router.get("/policies")
 @may(Action.READ, where=RoleScope.SOMEWHERE)
 @paged()
 def list_policies() -> PolicyCatalogue:
@@ -53,7 +53,7 @@ def list_policies() -> PolicyCatalogue:
     )
 
 
-@router.get("/datasets/{dataset}/policy", responses={**responses(404), 200: {"headers": TAGGED}})
+@router.get("/datasets/{dataset}/policy", responses={200: {"headers": TAGGED}})
 @may(Action.READ, dataset=OwnedKind.DATASET)
 def get_policy(dataset: DatasetPath, store: AppStore, response: Response) -> PolicyStateDocument:
     """The policy of the dataset, and its earlier versions."""
@@ -71,10 +71,7 @@ def _make_policy_change_response(judged: PolicyStateAndJob) -> Response:
 
 
 @router.put(
-    "/datasets/{dataset}/policy",
-    status_code=202,
-    response_model=JobDocument,
-    responses={**responses(404, 412, 413, 415, 428), **CHANGED},
+    "/datasets/{dataset}/policy", status_code=202, response_model=JobDocument, responses=CHANGED
 )
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(_make_policy_change_response)

@@ -23,7 +23,6 @@ from app.http.access import get_current_login
 from app.http.deps import Actor, AppServices, Id, Sees
 from app.http.documents import Document, RequestBody, respond_with
 from app.http.permissions import Action, OwnedKind, RoleScope, may
-from app.http.problem import responses
 from app.http.route import Route
 
 LessonState = Literal["open", "mended", "right", "almost", "wrong"]
@@ -107,7 +106,7 @@ async def _find_practice_person(request: Request) -> str | None:
 Person = Annotated[str | None, Depends(_find_practice_person)]
 
 
-@router.get("/practice", response_model=PracticeDocument, responses=responses())
+@router.get("/practice", response_model=PracticeDocument)
 @may(Action.READ, where=RoleScope.SOMEWHERE)
 def get_practice(services: AppServices, visibility: Sees, person: Person) -> Practice:
     """Every lesson and what has come of it; none until the practice is made.
@@ -117,7 +116,7 @@ def get_practice(services: AppServices, visibility: Sees, person: Person) -> Pra
     return read_practice(services.store, services.settings, visibility, person)
 
 
-@router.post("/practice", **describe_job_response_for_openapi(409, 413, 415, 503))
+@router.post("/practice", **describe_job_response_for_openapi(409))
 @may(Action.ANNOTATE, where=RoleScope.OWN)
 @respond_with(make_job_response)
 def start_practice(
@@ -140,7 +139,7 @@ def start_practice(
     )
 
 
-@router.get("/practice/recording", response_model=RecordingPracticeDocument, responses=responses())
+@router.get("/practice/recording", response_model=RecordingPracticeDocument)
 @may(Action.READ, where=RoleScope.SOMEWHERE)
 def get_recording_practice(
     services: AppServices, visibility: Sees, person: Person
@@ -149,7 +148,7 @@ def get_recording_practice(
     return read_recording_practice(services.store, services.settings, visibility, person)
 
 
-@router.post("/practice/recording", **describe_job_response_for_openapi(409, 413, 415, 503))
+@router.post("/practice/recording", **describe_job_response_for_openapi(409))
 @may(Action.ANNOTATE, where=RoleScope.OWN)
 @respond_with(make_job_response)
 def start_recording_practice(
@@ -172,7 +171,7 @@ def start_recording_practice(
     )
 
 
-@router.get("/groups/{group}/lesson", response_model=LessonDocument, responses=responses(404))
+@router.get("/groups/{group}/lesson", response_model=LessonDocument)
 @may(Action.READ, group=OwnedKind.GROUP)
 def get_lesson(group: Id, services: AppServices) -> PracticeLesson:
     """What a practice group asks, and whether it was answered rightly; 404 for other groups."""

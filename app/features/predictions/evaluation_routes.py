@@ -43,7 +43,7 @@ from app.http.documents import (
 )
 from app.http.headers import make_content_disposition
 from app.http.permissions import Action, OwnedKind, may
-from app.http.problem import Responses, responses
+from app.http.problem import Responses
 from app.http.request_limits import TRANSFER, limit
 from app.http.route import Route
 from app.json_text import MAX_ID
@@ -227,7 +227,7 @@ TABLE_FILES = _describe_file_responses(
 )
 
 
-@router.get("/datasets/{dataset}/evaluations", responses=responses(404))
+@router.get("/datasets/{dataset}/evaluations")
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_evaluations(dataset: DatasetPath, store: AppStore) -> EvaluationList:
@@ -236,9 +236,7 @@ def list_evaluations(dataset: DatasetPath, store: AppStore) -> EvaluationList:
     return EvaluationList(items=found)
 
 
-@router.post(
-    "/datasets/{dataset}/evaluations", **describe_job_response_for_openapi(404, 409, 413, 415)
-)
+@router.post("/datasets/{dataset}/evaluations", **describe_job_response_for_openapi(409))
 @may(
     Action.LEAD,
     dataset=OwnedKind.DATASET,
@@ -258,16 +256,14 @@ def start_evaluation(
     return request_evaluation(services.jobs, store, dataset, wanted, actor=actor)
 
 
-@router.get(
-    "/evaluations/{evaluation}", response_model=EvaluationDocument, responses=responses(404)
-)
+@router.get("/evaluations/{evaluation}", response_model=EvaluationDocument)
 @may(Action.READ, evaluation=OwnedKind.EVALUATION)
 def get_evaluation(evaluation: Id, store: AppStore) -> review.StoredEvaluation:
     """One evaluation: what it pins, its tables, and the names of its figures."""
     return review.get_evaluation(store, evaluation)
 
 
-@router.delete("/evaluations/{evaluation}", status_code=204, responses=responses(404))
+@router.delete("/evaluations/{evaluation}", status_code=204)
 @may(Action.LEAD, evaluation=OwnedKind.EVALUATION)
 @respond_with(make_empty_response)
 def delete_evaluation(evaluation: Id, store: AppStore, actor: Actor) -> None:
@@ -278,7 +274,7 @@ def delete_evaluation(evaluation: Id, store: AppStore, actor: Actor) -> None:
 @router.get(
     "/evaluations/{evaluation}/figures/{figure}.{ending}",
     response_class=Response,
-    responses={**responses(404), **FIGURE_FILES},
+    responses=FIGURE_FILES,
 )
 @may(Action.READ, evaluation=OwnedKind.EVALUATION)
 @limit(TRANSFER)
@@ -302,7 +298,7 @@ def get_figure(
 @router.get(
     "/evaluations/{evaluation}/tables/{table}.{ending}",
     response_class=Response,
-    responses={**responses(404), **TABLE_FILES},
+    responses=TABLE_FILES,
 )
 @may(Action.READ, evaluation=OwnedKind.EVALUATION)
 def get_table(
@@ -323,7 +319,7 @@ def get_table(
     return _csv_response(table_to_csv(found), f"touchline-{evaluation}-{table}.csv")
 
 
-@router.get("/evaluations/{evaluation}/frames", response_model=FrameList, responses=responses(404))
+@router.get("/evaluations/{evaluation}/frames", response_model=FrameList)
 @may(Action.READ, evaluation=OwnedKind.EVALUATION)
 def list_evaluation_frames(
     evaluation: Id,
@@ -348,7 +344,7 @@ def list_evaluation_frames(
     return review.list_frames(store, evaluation, query, limit, parse_cursor(cursor) or 0)
 
 
-@router.get("/evaluations/{evaluation}/compare", responses=responses(404))
+@router.get("/evaluations/{evaluation}/compare")
 @may(Action.READ, evaluation=OwnedKind.EVALUATION, with_=OwnedKind.EVALUATION)
 def compare_evaluations(
     evaluation: Id,

@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 
 from app.config import Settings
-from app.features.groups.routes import CHANGED, CONFLICTS, load_group_document_of_view
+from app.features.groups.routes import CHANGED, load_group_document_of_view
 from app.features.groups.schemas import GroupDocument, make_group_response
 from app.features.groups.state import GroupState
 from app.features.groups.submit import find_view_location
@@ -47,7 +47,7 @@ router = APIRouter(tags=["predictions"], route_class=Route)
 LOCATION = {"Location": {"description": "Of the set.", "schema": {"type": "string"}}}
 
 
-@router.get("/datasets/{dataset}/predictions", responses=responses(404))
+@router.get("/datasets/{dataset}/predictions")
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_predictions(dataset: DatasetPath, store: AppStore) -> PredictionSetList:
@@ -66,7 +66,7 @@ def _make_added_response(found: review.PredictionSet) -> Response:
     response_model=PredictionSetDocument,
     status_code=201,
     responses={
-        **responses(404, 409, 413, 415),
+        **responses(409),
         201: {"headers": LOCATION, "description": "The set, with what could not be read."},
     },
 )
@@ -111,7 +111,7 @@ def _make_accepted_response(found: AcceptReport | Job) -> Response:
     "/predictions/accept",
     response_model=AcceptOutcome,
     responses={
-        **responses(404, 409, 413, 415),
+        **responses(409),
         **ACCEPTED,
         202: {**ACCEPTED[202], "model": JobDocument},
         200: {
@@ -139,16 +139,14 @@ def accept_predictions(
     return request_accept(services.jobs, store, request.dataset, value, actor=actor)
 
 
-@router.get(
-    "/predictions/{predictions}", response_model=PredictionSetDocument, responses=responses(404)
-)
+@router.get("/predictions/{predictions}", response_model=PredictionSetDocument)
 @may(Action.READ, predictions=OwnedKind.PREDICTIONS)
 def get_predictions(predictions: Id, store: AppStore) -> review.PredictionSet:
     """One set of predictions."""
     return review.get_predictions(store, predictions)
 
 
-@router.delete("/predictions/{predictions}", status_code=204, responses=responses(404))
+@router.delete("/predictions/{predictions}", status_code=204)
 @may(Action.LEAD, predictions=OwnedKind.PREDICTIONS)
 @respond_with(make_empty_response)
 def delete_predictions(predictions: Id, store: AppStore, actor: Actor) -> None:
@@ -156,7 +154,7 @@ def delete_predictions(predictions: Id, store: AppStore, actor: Actor) -> None:
     review.delete_predictions(store, predictions, actor=actor)
 
 
-@router.get("/views/{view}/predictions", responses=responses(404))
+@router.get("/views/{view}/predictions")
 @may(Action.READ, view=OwnedKind.VIEW)
 @paged()
 def get_view_predictions(view: Id, store: AppStore) -> ViewPredictions:
@@ -168,7 +166,7 @@ def get_view_predictions(view: Id, store: AppStore) -> ViewPredictions:
     )
 
 
-@router.get("/groups/{group}/predictions", responses=responses(404))
+@router.get("/groups/{group}/predictions")
 @may(Action.READ, group=OwnedKind.GROUP)
 @paged()
 def get_group_predictions(group: Id, store: AppStore) -> GroupPredictionsDocument:
@@ -179,7 +177,7 @@ def get_group_predictions(group: Id, store: AppStore) -> GroupPredictionsDocumen
 @router.post(
     "/views/{view}/predictions/{prediction}/accept",
     response_model=GroupDocument,
-    responses={**responses(*CONFLICTS), **CHANGED},
+    responses={**CHANGED, **responses(413, 415)},
 )
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
 @respond_with(make_group_response)

@@ -46,7 +46,6 @@ from app.http.cursor import paged
 from app.http.deps import AppServices, AppStore, DatasetPath, Id, QueryText
 from app.http.documents import Document, ListDocument
 from app.http.permissions import Action, OwnedKind, RoleScope, may
-from app.http.problem import responses
 from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
 from app.soccer.choices import VerdictState
@@ -416,7 +415,7 @@ class MarkingInfluences(ListDocument[MarkingInfluenceDocument]):
     """The influence of every annotated marking of a view."""
 
 
-@query_fields_router.get("/query-fields", responses=responses())
+@query_fields_router.get("/query-fields")
 @may(Action.READ, where=RoleScope.SOMEWHERE)
 @paged()
 def list_query_fields() -> QueryFieldList:
@@ -424,7 +423,7 @@ def list_query_fields() -> QueryFieldList:
     return QueryFieldList(items=FIELDS, sorts=ORDERS)
 
 
-@statistics_router.get("", response_model=StatisticsDocument, responses=responses(404))
+@statistics_router.get("", response_model=StatisticsDocument)
 @may(Action.READ, dataset=OwnedKind.DATASET)
 def get_statistics(
     dataset: DatasetPath, services: AppServices, query: QueryText = ""
@@ -439,7 +438,7 @@ def get_statistics(
     return services.statistics.get_statistics(found)
 
 
-@timeline_router.get("", responses=responses(404))
+@timeline_router.get("")
 @may(Action.READ, dataset=OwnedKind.DATASET)
 def get_timeline(
     dataset: DatasetPath, store: AppStore, query: QueryText = "", match: MatchName = None
@@ -448,7 +447,7 @@ def get_timeline(
     return TimelineDocument.of(read_timeline(store, dataset_id(store, dataset), query, match))
 
 
-@insight_router.get("/groups/{group}/suggestions", responses=responses(404))
+@insight_router.get("/groups/{group}/suggestions")
 @may(Action.READ, group=OwnedKind.GROUP)
 @limit(COMPUTE)
 @paged()
@@ -461,7 +460,7 @@ def get_suggestions(group: Id, store: AppStore) -> GroupFixSuggestions:
     return GroupFixSuggestions(items=found)
 
 
-@insight_router.get("/views/{view}/influence", responses=responses(404))
+@insight_router.get("/views/{view}/influence")
 @may(Action.READ, view=OwnedKind.VIEW)
 @limit(COMPUTE)
 @paged()

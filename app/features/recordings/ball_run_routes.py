@@ -51,7 +51,7 @@ def _make_created_response(found: StoredRun) -> Response:
     )
 
 
-@router.get("", operation_id="listBallRuns", responses=responses(404))
+@router.get("", operation_id="listBallRuns")
 @may(Action.READ, recording=OwnedKind.RECORDING)
 @paged()
 def get_runs(recording: Id, services: AppServices) -> BallRunList:
@@ -67,7 +67,7 @@ def get_runs(recording: Id, services: AppServices) -> BallRunList:
     response_model=BallRunFrames,
     status_code=201,
     responses={
-        **responses(404, 409, 413, 415, 503),
+        **responses(409),
         201: {"description": "The run.", "headers": {**TAGGED["headers"], **LOCATION}},
     },
 )
@@ -87,10 +87,7 @@ def follow_ball(
 
 
 @router.get(
-    "/{run}",
-    operation_id="getBallRun",
-    response_model=BallRunFrames,
-    responses={**responses(404), 200: TAGGED},
+    "/{run}", operation_id="getBallRun", response_model=BallRunFrames, responses={200: TAGGED}
 )
 @may(Action.READ, recording=OwnedKind.RECORDING)
 def get_one(recording: Id, run: RunId, store: AppStore) -> Response:
@@ -99,9 +96,7 @@ def get_one(recording: Id, run: RunId, store: AppStore) -> Response:
 
 
 @router.post(
-    "/{run}/clicks",
-    response_model=BallRunFrames,
-    responses={**responses(404, 409, 412, 413, 415, 428, 503), 200: TAGGED},
+    "/{run}/clicks", response_model=BallRunFrames, responses={**responses(409), 200: TAGGED}
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
 @limit(COMPUTE)
@@ -122,11 +117,7 @@ def mend_ball_run(
         return extend_ball_run(store, services.balls, recording, run, click, if_match, actor=actor)
 
 
-@router.patch(
-    "/{run}",
-    response_model=BallRunFrames,
-    responses={**responses(404, 409, 412, 413, 415, 428), 200: TAGGED},
-)
+@router.patch("/{run}", response_model=BallRunFrames, responses={**responses(409), 200: TAGGED})
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
 @respond_with(_make_run_response)
 def change_ball_run(
@@ -156,7 +147,7 @@ def change_ball_run(
     "/{run}",
     status_code=204,
     response_class=Response,
-    responses={**responses(404), 204: {"description": "It is gone."}},
+    responses={204: {"description": "It is gone."}},
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
 @respond_with(make_empty_response)

@@ -56,7 +56,7 @@ FILE: Responses = {
 }
 
 
-@router.get("/{recording}/cameras", responses=responses(404))
+@router.get("/{recording}/cameras")
 @may(Action.READ, recording=OwnedKind.RECORDING)
 @paged()
 def list_cameras(recording: Id, store: AppStore) -> CamerasList:
@@ -65,7 +65,7 @@ def list_cameras(recording: Id, store: AppStore) -> CamerasList:
     return CamerasList(items=[CamerasDocument.model_validate(one) for one in found])
 
 
-@router.post("/{recording}/cameras", **describe_job_response_for_openapi(404, 409, 413, 415))
+@router.post("/{recording}/cameras", **describe_job_response_for_openapi(409))
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
 @respond_with(make_job_response)
 def track_cameras(
@@ -84,7 +84,7 @@ def track_cameras(
 @router.get(
     "/{recording}/cameras/{frame}",
     response_model=FrameCamerasDocument,
-    responses={**responses(404, 409), 200: TAGGED},
+    responses={**responses(409), 200: TAGGED},
 )
 @may(Action.READ, recording=OwnedKind.RECORDING)
 def get_cameras(
@@ -104,9 +104,7 @@ def get_cameras(
     return make_document_response(FrameCamerasDocument.of(frames, pitch), 200, headers)
 
 
-@router.patch(
-    "/{recording}/cameras/{frame}", **describe_job_response_for_openapi(404, 409, 413, 415)
-)
+@router.patch("/{recording}/cameras/{frame}", **describe_job_response_for_openapi(409))
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
 @respond_with(make_job_response)
 def turn_cameras(
@@ -125,7 +123,7 @@ def turn_cameras(
 @router.get(
     "/{recording}/cameras/{frame}/file",
     response_class=Response,
-    responses={**responses(404, 409), **FILE},
+    responses={**responses(409), **FILE},
 )
 @may(Action.READ, recording=OwnedKind.RECORDING)
 @limit(TRANSFER)

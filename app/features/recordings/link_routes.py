@@ -49,7 +49,7 @@ def _make_created_response(found: ShotLink) -> Response:
     return _make_link_response(found, 201, Location=at)
 
 
-@router.get("/links", operation_id="listLinks", responses=responses(404))
+@router.get("/links", operation_id="listLinks")
 @may(Action.READ, recording=OwnedKind.RECORDING)
 @paged()
 def get_links(recording: Id, store: AppStore) -> LinkList:
@@ -63,7 +63,6 @@ def get_links(recording: Id, store: AppStore) -> LinkList:
     "/links.csv",
     response_class=Response,
     responses={
-        **responses(404),
         200: {"content": {CSV_FILE: {}}, "description": "A row for each link, or piece of one."},
     },
 )
@@ -81,7 +80,7 @@ def get_links_file(recording: Id, store: AppStore) -> Response:
     response_model=LinkDocument,
     status_code=201,
     responses={
-        **responses(404, 409, 413, 415),
+        **responses(409),
         201: {
             "description": "The link; the same two shots again are the same link.",
             "headers": {**TAGGED["headers"], **LOCATION},
@@ -105,7 +104,7 @@ def add_one(recording: Id, wanted: NewShotLink, store: AppStore, actor: Actor) -
     )
 
 
-@router.get("/links/suggestions/{frame}", responses=responses(404, 409))
+@router.get("/links/suggestions/{frame}", responses=responses(409))
 @may(Action.READ, recording=OwnedKind.RECORDING)
 @paged()
 def suggest_live(recording: Id, frame: ReplayFrame, store: AppStore) -> LiveShotSuggestions:
@@ -113,7 +112,7 @@ def suggest_live(recording: Id, frame: ReplayFrame, store: AppStore) -> LiveShot
     return LiveShotSuggestions(items=suggest_live_shots(store, recording, frame))
 
 
-@router.get("/links/{link}", operation_id="getLink", responses={**responses(404), 200: TAGGED})
+@router.get("/links/{link}", operation_id="getLink", responses={200: TAGGED})
 @may(Action.READ, recording=OwnedKind.RECORDING)
 def get_one(recording: Id, link: LinkId, store: AppStore, response: Response) -> LinkDocument:
     """One link: its instants, and the map of the times that follows from them."""
@@ -122,7 +121,7 @@ def get_one(recording: Id, link: LinkId, store: AppStore, response: Response) ->
     return LinkDocument.model_validate(found)
 
 
-@router.get("/links/{link}/frames", responses=responses(404, 409))
+@router.get("/links/{link}/frames", responses=responses(409))
 @may(Action.READ, recording=OwnedKind.RECORDING)
 def get_linked_frames(recording: Id, link: LinkId, store: AppStore) -> LinkedFrames:
     """Which frame of the replay shows the same as each live frame."""
@@ -133,7 +132,7 @@ def get_linked_frames(recording: Id, link: LinkId, store: AppStore) -> LinkedFra
     "/links/{link}/instants",
     operation_id="setInstants",
     response_model=LinkDocument,
-    responses={**responses(404, 409, 412, 413, 415, 428), 200: TAGGED},
+    responses={**responses(409), 200: TAGGED},
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
 @respond_with(_make_link_response)
@@ -164,7 +163,7 @@ def put_instants(
         )
 
 
-@router.post("/links/{link}/ball", **describe_job_response_for_openapi(404, 413, 415))
+@router.post("/links/{link}/ball", **describe_job_response_for_openapi())
 @may(
     Action.LEAD,
     recording=OwnedKind.RECORDING,
@@ -188,7 +187,7 @@ def link_by_ball(
     "/links/{link}",
     status_code=204,
     response_class=Response,
-    responses={**responses(404), 204: {"description": "It is gone."}},
+    responses={204: {"description": "It is gone."}},
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
 @respond_with(make_empty_response)

@@ -84,7 +84,7 @@ OfDataset = Annotated[
 ]
 
 
-@router.get("", operation_id="listRecordings", responses=responses(404))
+@router.get("", operation_id="listRecordings")
 @may(Action.READ, dataset=OwnedKind.DATASET, where=RoleScope.SOMEWHERE, whole=True)
 @paged()
 def get_recordings(store: AppStore, sight: SeesWhole, dataset: OfDataset = None) -> RecordingList:
@@ -93,7 +93,7 @@ def get_recordings(store: AppStore, sight: SeesWhole, dataset: OfDataset = None)
     return RecordingList(items=[one for one in found if sight.sees(one.dataset_id)])
 
 
-@router.post("", **describe_job_response_for_openapi(404, 413, 415, 503))
+@router.post("", **describe_job_response_for_openapi())
 @may(
     Action.LEAD,
     body={
@@ -118,19 +118,14 @@ def add_recording(wanted: NewRecording, services: AppServices, actor: Actor) -> 
     )
 
 
-@router.get(
-    "/{recording}",
-    operation_id="getRecording",
-    response_model=RecordingDocument,
-    responses=responses(404),
-)
+@router.get("/{recording}", operation_id="getRecording", response_model=RecordingDocument)
 @may(Action.READ, recording=OwnedKind.RECORDING)
 def get_one(recording: Id, store: AppStore) -> Recording:
     """One recording: how long it is, how many shots it has, whether it can be read."""
     return get_recording(store, recording)
 
 
-@router.patch("/{recording}", response_model=RecordingDocument, responses=responses(404, 413, 415))
+@router.patch("/{recording}", response_model=RecordingDocument)
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
 @respond_with(make_document_responder(RecordingDocument.model_validate))
 def change_recording(
@@ -147,7 +142,7 @@ def change_recording(
     "/{recording}",
     status_code=204,
     response_class=Response,
-    responses={**responses(404), 204: {"description": "It is gone."}},
+    responses={204: {"description": "It is gone."}},
 )
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
 @respond_with(make_empty_response)
@@ -159,7 +154,7 @@ def delete_recording(recording: Id, store: AppStore, actor: Actor) -> None:
 @router.get(
     "/{recording}/frames/{frame}",
     response_class=Response,
-    responses={**responses(404, 409, 413, 503), **FRAME},
+    responses={**responses(409, 413), **FRAME},
 )
 @may(Action.READ, recording=OwnedKind.RECORDING)
 @limit(TRANSFER)
@@ -193,7 +188,7 @@ def _make_shots_response(found: RecordingShots) -> Response:
     return make_document_response(ShotList.of(found), 200, {"ETag": found.etag})
 
 
-@router.get("/{recording}/shots", responses={**responses(404, 409), 200: TAGGED})
+@router.get("/{recording}/shots", responses={**responses(409), 200: TAGGED})
 @may(Action.READ, recording=OwnedKind.RECORDING)
 @paged()
 def list_shots(recording: Id, store: AppStore, response: Response) -> ShotList:
@@ -207,7 +202,7 @@ def list_shots(recording: Id, store: AppStore, response: Response) -> ShotList:
     "/{recording}/shots.csv",
     response_class=Response,
     responses={
-        **responses(404, 409),
+        **responses(409),
         200: {"content": {CSV_FILE: {}}, "description": "A row for each shot."},
     },
 )
@@ -221,9 +216,7 @@ def get_shots_file(recording: Id, store: AppStore) -> Response:
 
 
 @router.put(
-    "/{recording}/shots",
-    response_model=ShotList,
-    responses={**responses(404, 409, 412, 413, 415, 428), 200: TAGGED},
+    "/{recording}/shots", response_model=ShotList, responses={**responses(409), 200: TAGGED}
 )
 @may(Action.ANNOTATE, recording=OwnedKind.RECORDING)
 @respond_with(_make_shots_response)
@@ -235,7 +228,7 @@ def set_shots(
         return replace_shots(store, recording, wanted.to_shots(), if_match, actor=actor)
 
 
-@router.post("/{recording}/shots", **describe_job_response_for_openapi(404))
+@router.post("/{recording}/shots", **describe_job_response_for_openapi())
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
 @respond_with(make_job_response)
 def find_shots(recording: Id, services: AppServices, actor: Actor) -> Job:
@@ -248,7 +241,7 @@ def find_shots(recording: Id, services: AppServices, actor: Actor) -> Job:
     return request_index(services.jobs, services.store, found, shots=True, actor=actor)
 
 
-@router.post("/{recording}/groups", **describe_job_response_for_openapi(404, 409, 413, 415))
+@router.post("/{recording}/groups", **describe_job_response_for_openapi(409))
 @may(Action.LEAD, recording=OwnedKind.RECORDING)
 @respond_with(make_job_response)
 def take_instants(

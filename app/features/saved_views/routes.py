@@ -38,7 +38,7 @@ class ReviewerList(ListDocument[Reviewer]):
     """Everybody who has judged a group, the most active first."""
 
 
-@router.get("/datasets/{dataset}/saved-views", responses=responses(404))
+@router.get("/datasets/{dataset}/saved-views")
 @may(Action.READ, dataset=OwnedKind.DATASET)
 @paged()
 def list_saved_views(dataset: DatasetPath, store: AppStore) -> SavedViewList:
@@ -57,7 +57,7 @@ def _saved_view_response(view: SavedView) -> Response:
     response_model=SavedView,
     status_code=201,
     responses={
-        **responses(404, 409, 413, 415),
+        **responses(409),
         201: {
             "headers": {"Location": {"description": "Its address.", "schema": {"type": "string"}}},
             "description": "The saved view.",
@@ -74,14 +74,14 @@ def create_saved_view(
     return saved_views.save_view(store, dataset_id(store, dataset), **values, actor=actor)
 
 
-@router.get("/saved-views/{view}", responses=responses(404))
+@router.get("/saved-views/{view}")
 @may(Action.READ, view=OwnedKind.SAVED_VIEW)
 def get_saved_view(view: Id, store: AppStore) -> SavedView:
     """One saved view."""
     return saved_views.read_saved_view(store, view)
 
 
-@router.delete("/saved-views/{view}", response_model=SavedView, responses=responses(404))
+@router.delete("/saved-views/{view}", response_model=SavedView)
 @may(Action.ANNOTATE, view=OwnedKind.SAVED_VIEW)
 @respond_with(make_document_response)
 def delete_saved_view(view: Id, store: AppStore) -> SavedView:
@@ -89,7 +89,7 @@ def delete_saved_view(view: Id, store: AppStore) -> SavedView:
     return saved_views.remove_saved_view(store, view)
 
 
-@router.get("/datasets/{dataset}/reviewers", responses=responses(404))
+@router.get("/datasets/{dataset}/reviewers")
 @may(Action.READ, dataset=OwnedKind.DATASET)
 @paged()
 def list_reviewers(dataset: DatasetPath, store: AppStore) -> ReviewerList:

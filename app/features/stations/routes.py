@@ -13,7 +13,7 @@ from app.db.idempotency import without_pending_response
 from app.errors import NotFoundError
 from app.features.groups.edit import SetStationCalibrationSource, SetStationLines
 from app.features.groups.edit_schemas import LinesEdit, StationCalibrationSourceEdit
-from app.features.groups.routes import CHANGED, CONFLICTS, load_group_document
+from app.features.groups.routes import CHANGED, load_group_document
 from app.features.groups.schemas import (
     DatasetReference,
     GroupDocument,
@@ -35,7 +35,7 @@ from app.http.deps import Actor, AppServices, AppStore, Id, IfMatch, Services
 from app.http.documents import respond_with
 from app.http.errors import add_current_state_to_conflicts
 from app.http.permissions import Action, OwnedKind, may
-from app.http.problem import Responses, responses
+from app.http.problem import responses
 from app.http.route import Route
 from app.json_text import MAX_ID
 from app.soccer.choices import CalibrationChoice
@@ -49,7 +49,6 @@ GroupOfStation = Annotated[
         description="The group to answer with; default: the first that the station takes part in.",
     ),
 ]
-STATION_CHANGED: Responses = {**responses(*CONFLICTS), **CHANGED}
 
 
 class StationDetail(BaseModel):
@@ -101,7 +100,6 @@ class StationDetail(BaseModel):
 @router.get(
     "/{station}",
     responses={
-        **responses(404),
         200: {"headers": {"ETag": {"description": "The station's.", "schema": {"type": "string"}}}},
     },
 )
@@ -113,7 +111,7 @@ def get_station(station: Id, store: AppStore, response: Response) -> StationDeta
     return StationDetail.of(state)
 
 
-@router.patch("/{station}/lines", response_model=GroupDocument, responses=STATION_CHANGED)
+@router.patch("/{station}/lines", response_model=GroupDocument, responses=CHANGED)
 @may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
 @respond_with(make_group_response)
 def set_station_lines(
@@ -133,7 +131,7 @@ def set_station_lines(
     return _change_station(services, station, group, change, if_match, actor)
 
 
-@router.patch("/{station}", response_model=GroupDocument, responses=STATION_CHANGED)
+@router.patch("/{station}", response_model=GroupDocument, responses=CHANGED)
 @may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
 @respond_with(make_group_response)
 def change_station(
@@ -153,7 +151,7 @@ def change_station(
     "/{station}/undo",
     operation_id="undoStation",
     response_model=GroupDocument,
-    responses=STATION_CHANGED,
+    responses={**CHANGED, **responses(413, 415)},
 )
 @may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
 @respond_with(make_group_response)
@@ -172,7 +170,7 @@ def undo(
     "/{station}/redo",
     operation_id="redoStation",
     response_model=GroupDocument,
-    responses=STATION_CHANGED,
+    responses={**CHANGED, **responses(413, 415)},
 )
 @may(Action.ANNOTATE, station=OwnedKind.STATION, group=OwnedKind.GROUP)
 @respond_with(make_group_response)

@@ -125,11 +125,7 @@ _SAME = (
 )
 
 
-@router.post(
-    "/{view}/ball/follow",
-    response_model=FollowedBallDocument,
-    responses=responses(404, 409, 413, 415, 503),
-)
+@router.post("/{view}/ball/follow", response_model=FollowedBallDocument, responses=responses(409))
 @may(Action.ANNOTATE, view=OwnedKind.VIEW)
 @limit(TRANSFER)
 async def follow_ball_of_view(

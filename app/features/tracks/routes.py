@@ -37,7 +37,7 @@ TAGGED = {"headers": {"ETag": {"description": "Of the track.", "schema": {"type"
 router = APIRouter(tags=["tracks"], route_class=Route)
 
 
-@router.get("/datasets/{dataset}/tracks", responses=responses(404))
+@router.get("/datasets/{dataset}/tracks")
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @limit(COMPUTE)
 @paged()
@@ -71,7 +71,7 @@ def list_tracks(
     return TrackList.of(choose_tracks(store, dataset, choice))
 
 
-@router.post("/datasets/{dataset}/tracks", **describe_job_response_for_openapi(404, 409, 413, 415))
+@router.post("/datasets/{dataset}/tracks", **describe_job_response_for_openapi(409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def make_tracks(
@@ -84,7 +84,7 @@ def make_tracks(
     return TRACKS.request(services.jobs, services.store, dataset, request.match, actor=actor)
 
 
-@router.get("/tracks/{track}", responses={**responses(404), 200: TAGGED})
+@router.get("/tracks/{track}", responses={200: TAGGED})
 @may(Action.READ, track=OwnedKind.TRACK)
 def get_track(track: Id, store: AppStore, response: Response) -> TrackDocument:
     """A track without its frames."""
@@ -93,7 +93,7 @@ def get_track(track: Id, store: AppStore, response: Response) -> TrackDocument:
     return found
 
 
-@router.get("/tracks/{track}/frames", responses={**responses(404), 200: TAGGED})
+@router.get("/tracks/{track}/frames", responses={200: TAGGED})
 @may(Action.READ, track=OwnedKind.TRACK)
 @limit(COMPUTE)
 def get_track_frames(
@@ -117,7 +117,7 @@ def get_track_frames(
     return found
 
 
-@router.get("/tracks/{track}/around", responses=responses(404))
+@router.get("/tracks/{track}/around")
 @may(Action.READ, track=OwnedKind.TRACK)
 @limit(COMPUTE)
 def get_track_around(
@@ -135,7 +135,7 @@ def get_track_around(
     return TrackExcerptDocument.of_excerpt(compute_track_excerpt(store, track, frame))
 
 
-@router.get("/groups/{group}/tracks", responses=responses(404))
+@router.get("/groups/{group}/tracks")
 @may(Action.READ, group=OwnedKind.GROUP)
 @paged()
 def list_tracks_of_group(group: Id, store: AppStore) -> GroupTrackList:
@@ -149,9 +149,7 @@ def _make_track_response(track: Track) -> Response:
 
 
 @router.patch(
-    "/tracks/{track}",
-    response_model=TrackDocument,
-    responses={**responses(404, 409, 412, 413, 415, 428), 200: TAGGED},
+    "/tracks/{track}", response_model=TrackDocument, responses={**responses(409), 200: TAGGED}
 )
 @may(Action.REVIEW, track=OwnedKind.TRACK)
 @respond_with(_make_track_response)

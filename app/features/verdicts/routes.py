@@ -17,7 +17,7 @@ from pydantic import (
 from app.features.agreement.service import compare_or_adopt_submission
 from app.features.datasets.service import dataset_id
 from app.features.findings.service import FindingReference, set_dismissal
-from app.features.groups.routes import CHANGED, CONFLICTS, load_group_document
+from app.features.groups.routes import CHANGED, load_group_document
 from app.features.groups.schemas import GroupDocument, make_group_response
 from app.features.groups.state import GroupState
 from app.features.queue.query import MAX_LISTED_LENGTH
@@ -180,7 +180,7 @@ class BulkVerdictList(ListDocument[BulkVerdictDocument]):
     tags=["groups"],
     operation_id="setVerdict",
     response_model=GroupDocument,
-    responses={**responses(*CONFLICTS), **CHANGED},
+    responses=CHANGED,
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
 @respond_with(make_group_response)
@@ -212,10 +212,7 @@ def put_verdict(
 
 
 @router.put(
-    "/groups/{group}/dismissal",
-    tags=["groups"],
-    response_model=GroupDocument,
-    responses={**responses(*CONFLICTS), **CHANGED},
+    "/groups/{group}/dismissal", tags=["groups"], response_model=GroupDocument, responses=CHANGED
 )
 @may(Action.REVIEW, group=OwnedKind.GROUP)
 @respond_with(make_group_response)
@@ -245,7 +242,7 @@ def dismiss_finding(
     "/datasets/{dataset}/verdicts",
     tags=["verdicts"],
     response_model=BulkResult,
-    responses=responses(404, 409, 413, 415),
+    responses=responses(409),
 )
 @may(Action.REVIEW, dataset=OwnedKind.DATASET)
 @respond_with(make_document_responder(BulkResult.of_report))
@@ -269,7 +266,7 @@ def set_verdicts(
     return bulk.give_verdicts(store, found, *values, actor=actor, expected=verdict.expected)
 
 
-@router.get("/datasets/{dataset}/verdict-batches", tags=["verdicts"], responses=responses(404))
+@router.get("/datasets/{dataset}/verdict-batches", tags=["verdicts"])
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 def list_verdict_batches(
     dataset: DatasetPath,
@@ -288,7 +285,7 @@ def list_verdict_batches(
     "/verdict-batches/{batch}/redo",
     tags=["verdicts"],
     response_model=RedoReport,
-    responses=responses(404, 409),
+    responses=responses(409),
 )
 @may(Action.REVIEW, batch=OwnedKind.BATCH)
 @respond_with(make_document_response)
@@ -305,7 +302,7 @@ def redo_verdict_batch(batch: Id, store: AppStore, actor: Actor) -> bulk_undo.Re
     "/verdict-batches/{batch}/undo",
     tags=["verdicts"],
     response_model=UndoReport,
-    responses=responses(404, 409),
+    responses=responses(409),
 )
 @may(Action.REVIEW, batch=OwnedKind.BATCH)
 @respond_with(make_document_response)

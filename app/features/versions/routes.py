@@ -259,7 +259,7 @@ def find_version_id_of_path(
 VersionPath = Annotated[int, Depends(find_version_id_of_path)]
 
 
-@router.get("/datasets/{dataset}/versions", responses=responses(404))
+@router.get("/datasets/{dataset}/versions")
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @paged()
 def list_versions(dataset: DatasetPath, store: AppStore) -> VersionList:
@@ -273,7 +273,7 @@ def list_versions(dataset: DatasetPath, store: AppStore) -> VersionList:
     status_code=202,
     response_model=JobDocument,
     responses={
-        **responses(404, 409, 413, 415),
+        **responses(409),
         **ACCEPTED,
         200: {"model": FreezePlan, "description": "After a dry run: what would be frozen."},
     },
@@ -300,21 +300,21 @@ def freeze_version(
     )
 
 
-@router.get("/versions/{version}", response_model=VersionDocument, responses=responses(404))
+@router.get("/versions/{version}", response_model=VersionDocument)
 @may(Action.READ, version=OwnedKind.VERSION, dataset=OwnedKind.DATASET)
 def get_version(version: VersionPath, store: AppStore) -> versions.Version:
     """One version."""
     return versions.get_version(store, version)
 
 
-@router.get("/versions/{version}/manifest", responses=responses(404))
+@router.get("/versions/{version}/manifest")
 @may(Action.READ, version=OwnedKind.VERSION, dataset=OwnedKind.DATASET)
 def get_version_manifest(version: VersionPath, store: AppStore) -> VersionManifest:
     """What a version says of itself: counts, settings, licence, overrides, changelog."""
     return VersionManifest.model_validate(make_version_manifest(store, version))
 
 
-@router.get("/versions/{version}/changelog", responses=responses(404))
+@router.get("/versions/{version}/changelog")
 @may(Action.READ, version=OwnedKind.VERSION, dataset=OwnedKind.DATASET)
 def get_changelog(version: VersionPath, store: AppStore) -> Changelog:
     """What changed since the version before, in sentences."""
@@ -322,7 +322,7 @@ def get_changelog(version: VersionPath, store: AppStore) -> Changelog:
     return Changelog(id=found.id, version=found.name, lines=make_version_changelog(store, version))
 
 
-@router.get("/versions/{version}/diff", operation_id="diffVersions", responses=responses(404))
+@router.get("/versions/{version}/diff", operation_id="diffVersions")
 @may(Action.READ, version=OwnedKind.VERSION, dataset=OwnedKind.DATASET)
 def get_diff(
     version: VersionPath,
@@ -342,7 +342,7 @@ def get_diff(
     return VersionDiffDocument.model_validate(diff_versions(store, older, version).to_values(limit))
 
 
-@router.post("/versions/{version}/verify", **describe_job_response_for_openapi(404))
+@router.post("/versions/{version}/verify", **describe_job_response_for_openapi())
 @may(Action.LEAD, version=OwnedKind.VERSION, dataset=OwnedKind.DATASET)
 @respond_with(make_job_response)
 def verify_version(version: VersionPath, services: AppServices, actor: Actor) -> Job:

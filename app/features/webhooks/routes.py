@@ -69,7 +69,7 @@ def _webhook_with_secret(made: tuple[Webhook, str]) -> WebhookWithSecret:
     return WebhookWithSecret(webhook=webhook, secret=secret)
 
 
-@router.get("", responses=responses(404, 409))
+@router.get("", responses=responses(409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 @paged()
 def list_webhooks(dataset: DatasetPath, store: AppStore) -> WebhookList:
@@ -78,7 +78,7 @@ def list_webhooks(dataset: DatasetPath, store: AppStore) -> WebhookList:
     return WebhookList(items=items, allowed=store.settings.webhooks, kinds=list(CHOSEN))
 
 
-@router.post("", status_code=201, responses=responses(404, 409, 413, 415))
+@router.post("", status_code=201, responses=responses(409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def make_webhook(
     dataset: DatasetPath, new: NewWebhook, store: AppStore, actor: Actor
@@ -89,7 +89,7 @@ def make_webhook(
     )
 
 
-@router.patch("/{webhook}", response_model=Webhook, responses=responses(404, 409, 413, 415))
+@router.patch("/{webhook}", response_model=Webhook, responses=responses(409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def change_webhook(
     dataset: DatasetPath, webhook: Id, change: WebhookEdit, store: AppStore, actor: Actor
@@ -100,14 +100,14 @@ def change_webhook(
     )
 
 
-@router.delete("/{webhook}", status_code=204, responses=responses(404, 409))
+@router.delete("/{webhook}", status_code=204, responses=responses(409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def delete_webhook(dataset: DatasetPath, webhook: Id, store: AppStore, actor: Actor) -> None:
     """Tell an address nothing more, and forget what it was told."""
     webhooks.remove_webhook(store, dataset, webhook, actor=actor)
 
 
-@router.post("/{webhook}/secret", responses=responses(404, 409))
+@router.post("/{webhook}/secret", responses=responses(409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def renew_webhook_secret(
     dataset: DatasetPath, webhook: Id, store: AppStore, actor: Actor
@@ -116,16 +116,14 @@ def renew_webhook_secret(
     return _webhook_with_secret(webhooks.renew_secret(store, dataset, webhook, actor=actor))
 
 
-@router.post(
-    "/{webhook}/ping", status_code=201, response_model=Delivery, responses=responses(404, 409)
-)
+@router.post("/{webhook}/ping", status_code=201, response_model=Delivery, responses=responses(409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def ping_webhook(dataset: DatasetPath, webhook: Id, store: AppStore, actor: Actor) -> Delivery:
     """Send a message of the kind `ping`, to see whether messages arrive."""
     return webhooks.send_ping(store, dataset, webhook, actor=actor)
 
 
-@router.get("/{webhook}/deliveries", responses=responses(404, 409))
+@router.get("/{webhook}/deliveries", responses=responses(409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def list_webhook_deliveries(
     dataset: DatasetPath,
@@ -142,9 +140,7 @@ def list_webhook_deliveries(
     return DeliveryList(items=found[:limit], next=more)
 
 
-@router.post(
-    "/{webhook}/deliveries/{delivery}", response_model=Delivery, responses=responses(404, 409)
-)
+@router.post("/{webhook}/deliveries/{delivery}", response_model=Delivery, responses=responses(409))
 @may(Action.LEAD, dataset=OwnedKind.DATASET)
 def send_webhook_delivery_again(
     dataset: DatasetPath, webhook: Id, delivery: Id, store: AppStore

@@ -14,7 +14,6 @@ from app.features.what_if.funnel import UNSOLVED, Yield, count_yield
 from app.http.deps import AppServices, DatasetPath
 from app.http.documents import Document
 from app.http.permissions import Action, OwnedKind, may
-from app.http.problem import responses
 from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
 from app.soccer.policy import CalibrationPolicy, Policy
@@ -180,7 +179,7 @@ class YieldDocument(Document):
     )
 
 
-@router.get("", response_model=YieldDocument, responses=responses(404))
+@router.get("", response_model=YieldDocument)
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @limit(COMPUTE)
 def get_yield(dataset: DatasetPath, services: AppServices) -> Yield:
@@ -194,7 +193,7 @@ def get_yield(dataset: DatasetPath, services: AppServices) -> Yield:
     return count_yield(services.yields, found)
 
 
-@router.post("", response_model=YieldDocument, responses=responses(404, 413, 415))
+@router.post("", response_model=YieldDocument)
 @may(Action.READ, dataset=OwnedKind.DATASET, whole=True)
 @limit(COMPUTE)
 def try_policy(dataset: DatasetPath, values: ThresholdsToTry, services: AppServices) -> Yield:

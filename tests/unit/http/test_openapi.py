@@ -43,6 +43,13 @@ class TestDocument:
             assert bool(found) == ("428" in operation["responses"]), name
             assert all(one["required"] for one in found), name
 
+    def test_says_what_every_request_for_something_and_every_body_can_meet(self, document) -> None:
+        for name, operation in operations(document):
+            statuses = set(operation["responses"])
+            assert {"400", "401", "403", "422", "500", "503"} <= statuses, name
+            assert "{" not in name or "404" in statuses, name
+            assert "requestBody" not in operation or {"413", "415"} <= statuses, name
+
     def test_gives_every_operation_a_name_of_its_own(self, document) -> None:
         names = [operation["operationId"] for _, operation in operations(document)]
         assert len(set(names)) == len(names)
