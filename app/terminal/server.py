@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import closing, contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 from urllib.parse import urlsplit
 
 from app.durable import is_open_to_others
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from app.db.store import Store
     from touchline.client import Client
 
+Answer = TypeVar("Answer", bound=Collection[Any])
 ABLE = (
     "datasets",
     "findings",
@@ -142,6 +143,22 @@ def connect_to_server(server: ServerPlace) -> Iterator[Client]:
             yield client
     except TouchlineError as error:
         raise _translate_client_error(server, error) from error
+
+
+def ask_server(call: Callable[[Client], Answer]) -> Answer | None:
+    """What the server answers that this command works against; None: it works in a home.
+
+    Args:
+        call: Asks it; what it returns is never None.
+
+    Raises:
+        ReviewError: It is not there, is of another version, does not know us, or refuses something.
+    """
+    server = get_current_server()
+    if server is None:
+        return None
+    with connect_to_server(server) as client:
+        return call(client)
 
 
 def _require_same_version(server: ServerPlace, client: Client) -> None:

@@ -8,9 +8,9 @@ from typing import Annotated, Any
 import typer
 
 from app.soccer.choices import GoldStart
+from app.terminal import remote
 from app.terminal.options import Json, get_current_actor
-from app.terminal.remote import BATCH
-from app.terminal.server import connect_to_server, get_current_server, open_store
+from app.terminal.server import ask_server, open_store
 from app.terminal.terminal import print_rows, print_values
 
 commands = typer.Typer(help="Groups that are assigned to people.", no_args_is_help=True)
@@ -22,13 +22,8 @@ Number = Annotated[int, typer.Argument(help="Number of the batch.", min=1)]
 @commands.command("list")
 def list_(dataset: Dataset, json_: Json = False) -> None:
     """List the batches of a dataset: open ones and those that are due first come first."""
-    server = get_current_server()
-    if server is not None:
-        from app.terminal.remote import fetch_batches
-
-        with connect_to_server(server) as client:
-            found = fetch_batches(client, dataset)
-    else:
+    found = ask_server(lambda client: remote.fetch_batches(client, dataset))
+    if found is None:
         from app.features.batches.service import list_batches
 
         with open_store() as store:
@@ -71,37 +66,27 @@ def give(
         "gold_every": gold_every,
         "skip_given": not again,
     }
-    server = get_current_server()
-    if server is not None:
-        from app.terminal.remote import create_batch_on_server
+    body = {**fields, "q": query, "due": None if day is None else day.isoformat()}
+    found = ask_server(lambda client: remote.create_batch_on_server(client, dataset, body))
+    if found is None:
+        from app.features.batches.service import NewBatch, make_batch
 
-        body = {**fields, "q": query, "due": None if day is None else day.isoformat()}
-        with connect_to_server(server) as client:
-            print_values(create_batch_on_server(client, dataset, body), json_)
-        return
-    from app.features.batches.service import NewBatch, make_batch
-
-    with open_store() as store:
         new = NewBatch(query=query, due=day, **fields)
-        print_values(
-            _batch_to_json(make_batch(store, dataset, new, actor=get_current_actor())), json_
-        )
+        with open_store() as store:
+            found = _batch_to_json(make_batch(store, dataset, new, actor=get_current_actor()))
+    print_values(found, json_)
 
 
 @commands.command()
 def show(batch: Number, json_: Json = False) -> None:
     """Show how far a batch is."""
-    server = get_current_server()
-    if server is not None:
-        from app.terminal.remote import fetch_batch
+    found = ask_server(lambda client: remote.fetch_batch(client, batch))
+    if found is None:
+        from app.features.batches.service import get_batch
 
-        with connect_to_server(server) as client:
-            print_values(fetch_batch(client, batch), json_)
-        return
-    from app.features.batches.service import get_batch
-
-    with open_store() as store:
-        print_values(_batch_to_json(get_batch(store, batch)), json_)
+        with open_store() as store:
+            found = _batch_to_json(get_batch(store, batch))
+    print_values(found, json_)
 
 
 @commands.command()
@@ -123,13 +108,10 @@ def gold(
 
     if source not in (TruthSource.SAMPLE, TruthSource.VERSION):
         raise typer.BadParameter("use --from sample or --from version", param_hint="--from")
-    server = get_current_server()
-    if server is not None:
-        from app.terminal.remote import make_gold_groups_on_server
-
-        body = {"source": source, "version": version, "q": query, "size": size, "start": start}
-        with connect_to_server(server) as client:
-            print_values(make_gold_groups_on_server(client, dataset, body), json_)
+    body = {"source": source, "version": version, "q": query, "size": size, "start": start}
+    made = ask_server(lambda client: remote.make_gold_groups_on_server(client, dataset, body))
+    if made is not None:
+        print_values(made, json_)
         return
     from app.features.independent_annotations.known_truth import (
         GoldChoice,
@@ -152,44 +134,34 @@ def change(
     """Change how many gold groups a batch mixes in, also while people work on it."""
     if (gold_every is None) != no_gold:
         raise typer.BadParameter("use either --gold-every or --no-gold", param_hint="--gold-every")
-    server = get_current_server()
-    if server is not None:
-        from app.terminal.remote import change_gold_frequency
+    found = ask_server(lambda client: remote.change_gold_frequency(client, batch, gold_every))
+    if found is None:
+        from app.features.batches.service import change_batch
 
-        with connect_to_server(server) as client:
-            print_values(change_gold_frequency(client, batch, gold_every), json_)
-        return
-    from app.features.batches.service import change_batch
-
-    with open_store() as store:
-        found = change_batch(
-            store, batch, actor=get_current_actor(), gold_every=gold_every, no_gold=no_gold
-        )
-    print_values(_batch_to_json(found), json_)
+        with open_store() as store:
+            changed = change_batch(
+                store, batch, actor=get_current_actor(), gold_every=gold_every, no_gold=no_gold
+            )
+        found = _batch_to_json(changed)
+    print_values(found, json_)
 
 
 @commands.command()
 def close(batch: Number, json_: Json = False) -> None:
     """Give nothing more out of a batch; what was said of its groups stays."""
-    server = get_current_server()
-    if server is not None:
-        from app.terminal.remote import close_batch
+    found = ask_server(lambda client: remote.close_batch(client, batch))
+    if found is None:
+        from app.features.batches.queries import CLOSED
+        from app.features.batches.service import change_batch
 
-        with connect_to_server(server) as client:
-            print_values(close_batch(client, batch), json_)
-        return
-    from app.features.batches.queries import CLOSED
-    from app.features.batches.service import change_batch
-
-    with open_store() as store:
-        print_values(
-            _batch_to_json(change_batch(store, batch, actor=get_current_actor(), state=CLOSED)),
-            json_,
-        )
+        with open_store() as store:
+            changed = change_batch(store, batch, actor=get_current_actor(), state=CLOSED)
+        found = _batch_to_json(changed)
+    print_values(found, json_)
 
 
 def _batch_to_json(batch: Any) -> dict[str, Any]:
-    return {name: getattr(batch, name) for name in BATCH}
+    return {name: getattr(batch, name) for name in remote.BATCH}
 
 
 def _format_batch(value: dict[str, Any]) -> str:

@@ -7,8 +7,8 @@ from typing import Annotated, Any
 import typer
 
 from app.terminal.options import Json, get_current_actor
-from app.terminal.remote import DATASET
-from app.terminal.server import ServerPlace, connect_to_server, get_current_server, open_store
+from app.terminal.remote import DATASET, fetch_datasets
+from app.terminal.server import ask_server, open_store
 from app.terminal.terminal import print_json, print_values, say
 
 commands = typer.Typer(help="What datasets there are.", no_args_is_help=True)
@@ -17,8 +17,9 @@ commands = typer.Typer(help="What datasets there are.", no_args_is_help=True)
 @commands.command("list")
 def list_(json_: Json = False) -> None:
     """List every dataset with its progress."""
-    server = get_current_server()
-    values = _read_local_datasets() if server is None else _read_remote_datasets(server)
+    values = ask_server(fetch_datasets)
+    if values is None:
+        values = _read_local_datasets()
     if json_:
         print_json(values)
         return
@@ -38,13 +39,6 @@ def _read_local_datasets() -> list[dict[str, Any]]:
         {**{name: getattr(item, name) for name in DATASET}, "policy": item.policy.name}
         for item in datasets
     ]
-
-
-def _read_remote_datasets(server: ServerPlace) -> list[dict[str, Any]]:
-    from app.terminal.remote import fetch_datasets
-
-    with connect_to_server(server) as client:
-        return fetch_datasets(client)
 
 
 @commands.command()

@@ -19,6 +19,7 @@ from app.soccer.choices import (
     TrainingViews,
 )
 from app.soccer.frames import ImageSize
+from app.terminal import remote
 from app.terminal.options import (
     POLICY_OR_FILE,
     Dataset,
@@ -137,8 +138,6 @@ def import_(
     path = paths[0]
     server = get_current_server()
     if server is not None:
-        from app.terminal import remote
-
         options: dict[str, Any] = {
             **({} if calibration is None else {"calibration": calibration}),
             "frame_offset": parse_frame_offset(frame_offset),
@@ -249,8 +248,6 @@ def export(
     }
     server = get_current_server()
     if server is not None:
-        from app.terminal import remote
-
         if images == "link":
             raise typer.BadParameter(
                 "a server cannot link to frames of this computer: use --images copy or --images none"

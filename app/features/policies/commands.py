@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from app.terminal import remote
 from app.terminal.options import POLICY_OR_FILE, Dataset, Json, get_current_actor, read_text
-from app.terminal.server import connect_to_server, get_current_server, open_store
+from app.terminal.server import ask_server, open_store
 from app.terminal.terminal import print_json, print_values, say
 
 if TYPE_CHECKING:
@@ -26,14 +27,9 @@ def show(
     json_: Json = False,
 ) -> None:
     """Print the policy of a dataset as YAML, ready for `policy set`."""
-    server = get_current_server()
-    if server is not None:
-        from app.terminal import remote
-
-        with connect_to_server(server) as client:
-            text, values = remote.fetch_policy(client, dataset)
-    else:
-        text, values = _read_local_policy(dataset)
+    text, values = ask_server(
+        lambda client: remote.fetch_policy(client, dataset)
+    ) or _read_local_policy(dataset)
     if file is not None:
         _write_text(file, text)
     if json_:
@@ -58,12 +54,8 @@ def set_(
     from app.features.solutions.service import list_stale_groups
 
     chosen = read_policy_option(policy)
-    server = get_current_server()
-    if server is not None:
-        from app.terminal import remote
-
-        with connect_to_server(server) as client:
-            job = remote.set_policy(client, dataset, chosen)
+    job = ask_server(lambda client: remote.set_policy(client, dataset, chosen))
+    if job is not None:
         print_values(remote.describe_policy_change(job), json_)
         return
     with open_store() as store:

@@ -12,6 +12,7 @@ import typer
 from app.progress import ReportProgress
 from app.soccer.choices import AnyPredictionFormat, BoxKind, LiveRule
 from app.soccer.frames import ImageSize
+from app.terminal import remote
 from app.terminal.options import (
     Dataset,
     Json,
@@ -464,8 +465,6 @@ def _evaluate_on_server(
     progress: ReportProgress,
 ) -> tuple[_Values, list[_Values]]:
     """As ``_evaluate_locally``, by a server."""
-    from app.terminal import remote
-
     with connect_to_server(server) as client:
         values, sets = remote.evaluate_on_server(client, dataset, request, progress)
         if out is not None:

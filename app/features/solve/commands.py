@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.features.policies.commands import read_policy_option
+from app.terminal import remote
 from app.terminal.options import POLICY_OR_FILE, Cluster, Dataset, Json, Workers, get_current_actor
 from app.terminal.server import (
     ServerPlace,
+    ask_server,
     connect_to_server,
     get_current_server,
     open_store,
@@ -82,8 +84,6 @@ def solve(
 def _solve_on_server(
     server: ServerPlace, dataset: str, policy: Policy | None
 ) -> tuple[Mapping[str, Any], str]:
-    from app.terminal import remote
-
     with connect_to_server(server) as client, show_progress("Solving") as progress:
         return remote.solve_on_server(client, dataset, policy, progress)
 
@@ -100,13 +100,8 @@ def _print_solve_report(values: Mapping[str, Any], sentence: str, *, json_: bool
 @commands.command()
 def findings(dataset: Dataset, json_: Json = False) -> None:
     """List what a person should look at."""
-    server = get_current_server()
-    if server is not None:
-        from app.terminal import remote
-
-        with connect_to_server(server) as client:
-            values = list(remote.fetch_findings(client, dataset))
-    else:
+    values = ask_server(lambda client: list(remote.fetch_findings(client, dataset)))
+    if values is None:
         from app.features.findings.service import iterate_findings_as_json
 
         with open_store() as store:

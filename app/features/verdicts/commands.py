@@ -8,8 +8,9 @@ from typing import Annotated, Any
 import typer
 
 from app.soccer.choices import VerdictState
+from app.terminal import remote
 from app.terminal.options import Dataset, Json, get_current_actor
-from app.terminal.server import connect_to_server, get_current_server, open_store
+from app.terminal.server import ask_server, open_store
 from app.terminal.terminal import print_error, print_json, print_values, say
 
 commands = typer.Typer()
@@ -47,16 +48,11 @@ def verdict(
     from app.features.verdicts.service import check_verdict
 
     check_verdict(state, reason, note)
-    server = get_current_server()
-    if server is not None:
-        from app.terminal import remote
-
-        body = {"q": query, "state": state, "reason": reason, "note": note, "expected": expected}
-        with connect_to_server(server) as client:
-            plan, report = remote.plan_or_give_verdicts(client, dataset, body, dry_run=dry_run)
-    else:
-        arguments = (query, state, reason, note)
-        plan, report = _give_verdicts_in_home(dataset, arguments, expected, dry_run=dry_run)
+    body = {"q": query, "state": state, "reason": reason, "note": note, "expected": expected}
+    arguments = (query, state, reason, note)
+    plan, report = ask_server(
+        lambda client: remote.plan_or_give_verdicts(client, dataset, body, dry_run=dry_run)
+    ) or _give_verdicts_in_home(dataset, arguments, expected, dry_run=dry_run)
     done = plan if report is None else report
     values: dict[str, Any] = {"matches": plan["matches"]}
     if report is None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.soccer.choices import SplitKind, VersionRule
+from app.terminal import remote
 from app.terminal.options import (
     Cluster,
     Dataset,
@@ -17,8 +18,8 @@ from app.terminal.options import (
     parse_cameras,
     read_text,
 )
-from app.terminal.remote import VERSION
 from app.terminal.server import (
+    ask_server,
     connect_to_server,
     get_current_server,
     open_store,
@@ -82,8 +83,6 @@ def freeze(
     text = licence if licence_file is None else read_text(licence_file, MAX_LICENCE)
     server = get_current_server()
     if server is not None:
-        from app.terminal import remote
-
         body = {
             "name": name or named,
             "note": note,
@@ -107,13 +106,8 @@ def freeze(
 @commands.command()
 def versions(dataset: Dataset, json_: Json = False) -> None:
     """List the frozen versions of a dataset, newest first."""
-    server = get_current_server()
-    if server is not None:
-        from app.terminal import remote
-
-        with connect_to_server(server) as client:
-            found = remote.fetch_versions(client, dataset)
-    else:
+    found = ask_server(lambda client: remote.fetch_versions(client, dataset))
+    if found is None:
         from app.features.versions.service import list_versions
 
         with open_store() as store:
@@ -184,7 +178,7 @@ def version_to_values(version: Version) -> dict[str, Any]:
     policy = {"policy": version.policy.name, "policy_hash": version.policy.hash}
     own = {"counts": dict(version.counts), "split": version.split.to_plain_values()}
     values = {**vars(version), **own, **policy}
-    return {name: values[name] for name in VERSION}
+    return {name: values[name] for name in remote.VERSION}
 
 
 def _format_difference(item: Any) -> str:
