@@ -22,7 +22,12 @@ SAME = 0.5
 
 @dataclass(frozen=True)
 class BallClick:
-    """Where a person says that the ball is: number of the frame, and pixel."""
+    """Where a person said that the ball is.
+
+    Attributes:
+        frame: Number of the frame.
+        x, y: Pixels of the recording.
+    """
 
     frame: int
     x: float

@@ -120,14 +120,15 @@ class BallEvent:
 
 @dataclass(frozen=True)
 class ViewJump:
-    """Where other views take over, and put the ball elsewhere than those before did: their cameras contradict each
-    other. It is no event of the ball.
+    """Where views that take over put the ball elsewhere: their cameras contradict each other.
+
+    It is no event of the ball.
 
     Attributes:
-        frame: The nearest one.
-        time_s: Seconds: from then on.
+        frame: The nearest frame.
+        time_s: From then on, seconds.
         metres: How far the ball jumps beside its motion.
-        views: Names of those that see it from then on.
+        views: Those that see it from then on.
     """
 
     frame: int

@@ -37,7 +37,6 @@ from app.features.queue.routes import (
     GroupPage,
     GroupRow,
     LogEntryDocument,
-    Neighbours,
 )
 from app.features.queue.service import MatchingGroupIds
 from app.http.access import get_current_login
@@ -231,7 +230,7 @@ def get_solution(group: Id, store: AppStore) -> SolutionDocument:
     return SolutionDocument.of(state.solution, state.group, state.dismissed)
 
 
-@router.get("/{group}/neighbours", response_model=Neighbours)
+@router.get("/{group}/neighbours")
 @may(Action.READ, group=OwnedKind.GROUP)
 def get_neighbours(group: Id, store: AppStore, query: QueryText = "") -> queue.Neighbours:
     """Where the group stands among those that match, and up to five before and after."""

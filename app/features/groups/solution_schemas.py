@@ -12,7 +12,10 @@ import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from app.features.groups.edit_codec import edit_to_json
-from app.features.groups.suggested_edits import find_guide_of_finding, list_edits_of_finding
+from app.features.groups.suggested_edits import (
+    find_guide_of_finding,
+    list_edits_of_finding,
+)
 from app.formats.camera_json import camera_to_json
 from app.geometry.camera import Camera
 from app.geometry.lens import BROWN_CONRADY
@@ -338,10 +341,6 @@ class FailingGate(Document):
     sentence: str
 
 
-class FixDocument(Document, shows=SuggestedFix):
-    """An edit that a finding proposes."""
-
-
 def _edit_to_json(edit: Any) -> Any:
     return edit if isinstance(edit, dict) else edit_to_json(edit)
 
@@ -386,7 +385,7 @@ class DismissalDocument(Document):
 class FindingDocument(Document, shows=Finding):
     """Something that a person should look at."""
 
-    fix: FixDocument | None
+    fix: SuggestedFix | None
     unusable_ball: bool = Field(
         description="Whether the ball is unusable: accepting the group then needs a note."
     )

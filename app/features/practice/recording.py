@@ -61,12 +61,12 @@ LOST = (0.4, 0.6)
 
 @dataclass(frozen=True)
 class RecordingPractice:
-    """The practice recording; ``lessons`` is empty until it is made.
+    """The practice recording; no lessons until it is made.
 
     Attributes:
-        dataset: Name of its dataset.
-        recording: Its id; None until it is made.
-        lessons: What is to do, and what has come of it.
+        dataset: Name of the dataset.
+        recording: Id of the recording; None until it is made.
+        lessons: The lessons, in order.
     """
 
     dataset: str

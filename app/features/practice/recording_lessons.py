@@ -37,12 +37,13 @@ class RecordingLesson:
         name: Which.
         question: What to do.
         hint: With which keys.
-        state: ``open`` as it was made, ``almost``, or ``right``.
+        state: Weighed against the film's truth: ``open`` as it was made, ``almost``, or ``right``.
         feedback: What is right and what is not, in words and numbers.
-        frame: Where to look.
-        right, total: How many shots or frames are right, of how many; of a link 0 or 1 of 1.
-        off: How far from the truth: pixels of the grass (median), metres of the tripod, live frames of a link; None where
-            nothing is known.
+        frame: Where to look: a frame of the recording.
+        right: How many shots, frames or links are right.
+        total: Of how many.
+        off: How far from the truth: pixels of the grass (cameras, median), metres (side), live frames (link); None
+            where nothing is known.
     """
 
     name: LessonName

@@ -11,7 +11,6 @@ from app.features.groups.submit import load_group_state
 from app.features.jobs.queries import Job
 from app.features.jobs.schemas import describe_job_response_for_openapi, make_job_response
 from app.features.practice.recording import RecordingPractice, read_recording_practice
-from app.features.practice.recording_lessons import LessonName, RecordingLesson
 from app.features.practice.service import (
     Practice,
     PracticeLesson,
@@ -71,32 +70,6 @@ class PracticeDocument(Document):
     lessons: list[LessonDocument]
 
 
-class RecordingLessonDocument(Document, shows=RecordingLesson):
-    """One lesson on the practice recording."""
-
-    name: LessonName = Field(description="Which.")
-    question: str = Field(description="What to do.")
-    hint: str = Field(description="With which keys.")
-    state: Literal["open", "almost", "right"] = Field(
-        description="Weighed against the film's truth."
-    )
-    feedback: str = Field(description="What is right and what is not, in words and numbers.")
-    frame: int = Field(description="Where to look: a frame of the recording.")
-    right: int = Field(description="How many shots, frames or links are right.")
-    total: int = Field(description="Of how many.")
-    off: float | None = Field(
-        description="How far from the truth: pixels of the grass (cameras), metres (side), live frames (link)."
-    )
-
-
-class RecordingPracticeDocument(Document):
-    """The practice recording; no lessons until it is made."""
-
-    dataset: str
-    recording: int | None = Field(description="Id of the recording.")
-    lessons: list[RecordingLessonDocument]
-
-
 async def _find_practice_person(request: Request) -> str | None:
     """Whose practice it is; None where nobody logs in."""
     login = get_current_login(request.scope)
@@ -139,7 +112,7 @@ def start_practice(
     )
 
 
-@router.get("/practice/recording", response_model=RecordingPracticeDocument)
+@router.get("/practice/recording")
 @may(Action.READ, where=RoleScope.SOMEWHERE)
 def get_recording_practice(
     services: AppServices, visibility: Sees, person: Person

@@ -20,7 +20,6 @@ from app.features.groups.solution_schemas import (
     EditOfferDocument,
     FailingGate,
     FindingDocument,
-    FixDocument,
     FixGuideDocument,
     Jac,
 )
@@ -30,7 +29,6 @@ from app.features.groups.suggestions import Suggestion, find_suggestions
 from app.features.people.visibility_queries import has_hidden_groups
 from app.features.queue.fields import FIELDS, ORDERS, FieldKind
 from app.features.queue.service import GroupRow as QueueRow
-from app.features.queue.service import Neighbours as QueueNeighbours
 from app.features.queue.statistics import (
     BallPositionCounts,
     MatchSplitCounts,
@@ -49,7 +47,7 @@ from app.http.permissions import Action, OwnedKind, RoleScope, may
 from app.http.request_limits import COMPUTE, limit
 from app.http.route import Route
 from app.soccer.choices import VerdictState
-from app.soccer.finding import Dismissal, Finding
+from app.soccer.finding import Dismissal, Finding, SuggestedFix
 
 THUMBNAIL_WIDTH = 208
 KINDS_WITH_BODY = frozenset(STATION_EDITS) | frozenset(
@@ -171,12 +169,6 @@ class GroupPage(ListDocument[GroupRow]):
     total: int = Field(description="How many match in all.")
 
 
-class Neighbours(Document, shows=QueueNeighbours):
-    """Where a group stands among those that match, and what comes before and after it."""
-
-    index: int | None = Field(description="From 0; null when the group does not match.")
-
-
 class FindingRow(Document):
     """A finding and where it was found; `group` is the group's key."""
 
@@ -190,7 +182,7 @@ class FindingRow(Document):
     threshold: float | None
     confidence: float | None
     sentence: str
-    fix: FixDocument | None
+    fix: SuggestedFix | None
     offers: list[EditOfferDocument] = Field(description="Edits that correct it.")
     guide: FixGuideDocument | None = Field(
         description="Where a person has to look or draw; null if edits are offered, or nothing."
@@ -356,7 +348,7 @@ class TimelineDocument(BaseModel):
         return TimelineDocument.model_construct(total=len(timeline.id), **values)
 
 
-class SuggestedEdit(FixDocument):
+class SuggestedEdit(Document, shows=SuggestedFix):
     """An edit as findings propose it, or a point moved."""
 
     point: XY | None = Field(

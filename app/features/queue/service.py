@@ -141,11 +141,13 @@ class Page:
 
 @dataclass(frozen=True)
 class Neighbours:
-    """Where a group stands among those that match.
+    """Where a group stands among those that match, and what comes before and after it.
 
     Attributes:
-        index: From 0; None when the group itself does not match (any more).
-        previous: Ids before it, the nearest first; ``next`` likewise after it.
+        index: From 0; None when the group does not match.
+        total: How many match in all.
+        previous: Ids of the groups before this one, the nearest first.
+        next: Ids of the groups after this one, the nearest first.
     """
 
     index: int | None

@@ -45,20 +45,12 @@ class BallRunReviewRequest(RequestBody, examples=[{"accepted": True}]):
         return BallRunReview(self.accepted, confirmed)
 
 
-class BallClickDocument(Document, shows=BallClick):
-    """Where a person said that the ball is."""
-
-    frame: int = Field(description="Number of the frame.")
-    x: float = Field(description="Pixels of the recording.")
-    y: float = Field(description="Pixels of the recording.")
-
-
 class BallRunDocument(Document):
     """A ball that was followed from clicks through the frames of a shot."""
 
     id: int
     recording: int = Field(description="Id of the recording.")
-    clicks: list[BallClickDocument] = Field(description="What people clicked, by frame.")
+    clicks: list[BallClick] = Field(description="What people clicked, by frame.")
     first: int = Field(description="Its first frame.")
     last: int = Field(description="Its last frame.")
     before: End = Field(

@@ -23,7 +23,7 @@ from app.geometry.arrays import FloatArray
 from app.http.documents import Document, ListDocument, RequestBody
 from app.json_text import MAX_ID, replace_non_finite
 from app.tracking.ball_correct import is_near_correction
-from app.tracking.ball_track import BallMode, BallState, EventCorrection, EventKind
+from app.tracking.ball_track import BallMode, BallState, EventCorrection, EventKind, ViewJump
 
 MOST_FRAMES = 5000
 """Of one answer."""
@@ -38,37 +38,6 @@ class CorrectionDocument(BaseModel):
     frame: Annotated[int, Field(ge=0, le=MAX_ID)] = Field(description="Of the stretch.")
     kind: EventKind = Field(description="What happened.")
     added: StrictBool = Field(description="Whether it happened; false: it did not.")
-
-
-class TrackSummaryDocument(Document, shows=TrackSummary):
-    """What came of tracking the ball over a stretch."""
-
-    frames: int = Field(description="Of the stretch.")
-    states: dict[str, int] = Field(
-        description="Frames by how the ball is known: `measured` by two views, `one_view`, "
-        "`predicted`, `bridged` over a gap, `gap`."
-    )
-    events: dict[str, int] = Field(description="Events by kind.")
-    measurements: int = Field(description="Balls that views show.")
-    contradicted: int = Field(description="Those that the track does not explain.")
-    median_px: float | None = Field(
-        description="Median error of balls that were left out in turn and predicted, pixels."
-    )
-    p95_px: float | None = Field(description="95th percentile of the same.")
-    worst: int | None = Field(description="The frame where that error is largest.")
-    reason: str | None = Field(description="Why there is no track; null: there is one.")
-    rate: float = Field(description="Frames a second.")
-    unused: dict[str, int] = Field(description="Balls that were not used, by reason.")
-    warnings: list[str] = Field(
-        description="Sentences: balls that were not used, jumps where other views take over, and runs of balls "
-        "that fit no track."
-    )
-    noise: dict[str, float] = Field(
-        description="Times that balls of a camera are noisier than clicks because it is inexact, by camera."
-    )
-    late: dict[str, float] = Field(
-        description="Seconds to add to the times of a camera, as the ball shows them, by camera."
-    )
 
 
 class TrackDocument(Document):
@@ -88,7 +57,7 @@ class TrackDocument(Document):
     corrections: list[CorrectionDocument] = Field(
         description="Events that people added and removed; they stay when it is made again."
     )
-    summary: TrackSummaryDocument = Field(description="What came of it.")
+    summary: TrackSummary = Field(description="What came of it.")
     created: datetime
     by: str = Field(validation_alias="actor")
     etag: str
@@ -124,15 +93,6 @@ class TrackEventDocument(Document):
     position: list[float] = Field(description="x, y and z in the pitch frame, metres, z down.")
     sigma_s: float = Field(description="Standard deviation of its time, seconds.")
     added: bool = Field(description="Whether a person added it.")
-
-
-class ViewJumpDocument(Document):
-    """Where views that take over put the ball elsewhere: their cameras contradict each other."""
-
-    frame: int = Field(description="The nearest frame.")
-    time_s: float = Field(description="From then on, seconds.")
-    metres: float = Field(description="How far the ball jumps beside its motion.")
-    views: list[str] = Field(description="Those that see it from then on.")
 
 
 class ContradictionDocument(Document):
@@ -178,7 +138,7 @@ class TrackFrames(Document):
     )
     group: list[int | None] = Field(description="Ids of groups.")
     events: list[TrackEventDocument] = Field(description="Those of these frames, by time.")
-    jumps: list[ViewJumpDocument] = Field(
+    jumps: list[ViewJump] = Field(
         description="Where the ball jumps in these frames because other views take over; no event of the ball."
     )
     contradicted: list[ContradictionDocument] = Field(
@@ -228,9 +188,7 @@ class TrackFrames(Document):
                 for event in ball.events
                 if event.frame in inside
             ],
-            jumps=[
-                ViewJumpDocument.model_validate(jump) for jump in ball.jumps if jump.frame in inside
-            ],
+            jumps=[jump for jump in ball.jumps if jump.frame in inside],
             contradicted=[item for item in _build_contradictions(detail) if item.frame in inside],
         )
 

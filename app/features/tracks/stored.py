@@ -26,23 +26,25 @@ UNJUDGED: dict[str, None] = dict.fromkeys(("verdict", "note", "judged_by", "judg
 
 @dataclass(frozen=True)
 class TrackSummary:
-    """The summary of a track for lists.
+    """What came of tracking the ball over a stretch.
 
     Attributes:
-        frames: Of its stretch.
-        states: How many of them are ``measured``, ``one_view``, ``predicted``, ``bridged`` and ``gap``.
-        events: How many there are, by kind.
-        measurements: What views measured.
-        contradicted: Measurements that took no part because the track does not explain them.
-        median_px, p95_px: Of what was left out in turn and predicted; None where nothing was.
-        worst: Frame with the largest such error; None where there is none.
-        reason: Why there is no track; None where there is one.
+        frames: Of the stretch.
+        states: Frames by how the ball is known: ``measured`` by two views, ``one_view``, ``predicted``,
+            ``bridged`` over a gap, ``gap``.
+        events: Events by kind.
+        measurements: Balls that views show.
+        contradicted: Those that the track does not explain.
+        median_px: Median error of balls that were left out in turn and predicted, pixels; None: none was.
+        p95_px: 95th percentile of the same.
+        worst: The frame where that error is largest.
+        reason: Why there is no track; None: there is one.
         rate: Frames a second.
-        unused: Balls that are no measurement, counted by reason.
-        warnings: Sentences: balls that took no part, and runs of measurements beside the track that fit
-            no ball.
-        noise: Times that balls of a view are noisier than clicks because its camera is inexact, by view.
-        late: Seconds to add to the times of a view, by view.
+        unused: Balls that were not used, by reason.
+        warnings: Sentences: balls that were not used, jumps where other views take over, and runs of balls
+            that fit no track.
+        noise: Times that balls of a camera are noisier than clicks because it is inexact, by camera.
+        late: Seconds to add to the times of a camera, as the ball shows them, by camera.
     """
 
     frames: int
@@ -96,11 +98,25 @@ class Track:
 
 
 def summarize_track(track: BallTrack, like: TrackSummary) -> TrackSummary:
-    """The summary of a track for lists.
+    """What came of tracking the ball over a stretch.
 
-    Args:
-        track: With its corrections.
-        like: Has what the track does not say: measurements, rate, balls that are none.
+    Attributes:
+        frames: Of the stretch.
+        states: Frames by how the ball is known: ``measured`` by two views, ``one_view``, ``predicted``,
+            ``bridged`` over a gap, ``gap``.
+        events: Events by kind.
+        measurements: Balls that views show.
+        contradicted: Those that the track does not explain.
+        median_px: Median error of balls that were left out in turn and predicted, pixels; None: none was.
+        p95_px: 95th percentile of the same.
+        worst: The frame where that error is largest.
+        reason: Why there is no track; None: there is one.
+        rate: Frames a second.
+        unused: Balls that were not used, by reason.
+        warnings: Sentences: balls that were not used, jumps where other views take over, and runs of balls
+            that fit no track.
+        noise: Times that balls of a camera are noisier than clicks because it is inexact, by camera.
+        late: Seconds to add to the times of a camera, as the ball shows them, by camera.
     """
     left, worst = track.left_out, None
     if left is not None and np.isfinite(left.by_frame).any():
