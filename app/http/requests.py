@@ -8,7 +8,7 @@ import asyncio
 import json
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
 from functools import lru_cache
 from typing import Any, NoReturn, get_args
@@ -240,18 +240,6 @@ def _collect_property_names(
     for key, part in schema.get("properties", {}).items():
         found.setdefault(place, set()).add(key)
         _collect_property_names(part, definitions, (*place, key), found, above)
-
-
-def _property_names(schema: Any) -> Iterator[str]:
-    if isinstance(schema, dict):
-        properties = schema.get("properties")
-        if isinstance(properties, dict):
-            yield from properties
-        for part in schema.values():
-            yield from _property_names(part)
-    elif isinstance(schema, list):
-        for part in schema:
-            yield from _property_names(part)
 
 
 MAX_JSON_BYTES = 512 * 1024

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass
-from typing import Any, cast, get_args
+from typing import Any, cast
 
 import numpy as np
 
@@ -35,7 +35,6 @@ from app.tracking.ball_track import (
 
 TRACK_VERSION = "5"
 """Of the solver: tracks of another one are stale."""
-EVENT_KINDS: tuple[str, ...] = get_args(EventKind)
 _UPPER = np.triu_indices(6)
 _NEAR_M = 1e-3
 """How near a part of a track comes to its solution: it is shown to the centimetre, and not stored."""
