@@ -86,3 +86,8 @@ ExportFormat = Literal[
     "npz",
     "touchline",
 ]
+GoalEdge = Literal["inner", "middle", "laws"]
+"""What stands for posts, crossbar and lines. ``inner``: the inner edges of a goal, 7.32 x 2.44 m, as the
+public evaluator has it; ``middle``: the middle of its frame, 7.44 x 2.50 m, where people click; ``laws``:
+that, and the middle of each line's paint, which lies half a line inside the plan, because the Laws
+measure to the outer edges."""

@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
 from app.errors import InputError, UnknownMarkingError
 from app.geometry.arrays import FloatArray
+from app.soccer.choices import GoalEdge
 
 PENALTY_AREA_LENGTH = 16.5
 PENALTY_AREA_WIDTH = 40.32
@@ -131,13 +131,6 @@ class Arc:
     def is_full(self) -> bool:
         """Whether the marking is a full circle."""
         return self.last - self.first >= 2 * math.pi - 1e-12
-
-
-GoalEdge = Literal["inner", "middle", "laws"]
-"""What stands for posts, crossbar and lines. ``inner``: the inner edges of a goal, 7.32 x 2.44 m, as the
-public evaluator has it; ``middle``: the middle of its frame, 7.44 x 2.50 m, where people click; ``laws``:
-that, and the middle of each line's paint, which lies half a line inside the plan, because the Laws
-measure to the outer edges."""
 
 
 @dataclass(frozen=True)

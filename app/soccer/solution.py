@@ -9,9 +9,9 @@ import math
 from dataclasses import dataclass, field
 
 from app.geometry.camera import Camera
+from app.soccer.choices import GoalEdge
 from app.soccer.finding import Finding
 from app.soccer.frames import Box, ImagePoint, height_above_grass
-from app.soccer.pitch import GoalEdge
 
 SOLVER_VERSION = "10"
 """Part of every solution's key; raised by one whenever a number changes."""

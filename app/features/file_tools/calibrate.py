@@ -33,10 +33,11 @@ from app.geometry.camera import Camera
 from app.json_text import json_text
 from app.progress import ReportProgress
 from app.soccer.annotation import remove_markings
+from app.soccer.choices import GoalEdge
 from app.soccer.finding import Finding
 from app.soccer.frames import ImageSize
 from app.soccer.picture import PictureGeometry
-from app.soccer.pitch import GoalEdge, Pitch
+from app.soccer.pitch import Pitch
 from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import add_lone_frame_covariance, analyse_lone_frame, calibrate

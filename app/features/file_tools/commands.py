@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
+from app.soccer.choices import GoalEdge
 from app.soccer.frames import ImageSize
 from app.terminal.options import Json, Size, Workers, parse_size, read_settings
 from app.terminal.terminal import print_error, print_json, print_values, say, show_progress
@@ -24,43 +24,21 @@ PROBLEMS = 10
 """Problems that are printed one by one."""
 
 
-class CameraFormat(StrEnum):
-    """What other tools read of cameras over time."""
-
-    NPZ = "npz"
-    OPENTRACKIO = "opentrackio"
-
-
-class LabelChecking(StrEnum):
-    """Whether calibration doubts the names of markings."""
-
-    CHECKED = "checked"
-    GIVEN = "given"
-
-
-class GoalEdgeOption(StrEnum):
-    """What people click of goals and lines (``soccer.pitch.GoalEdge``)."""
-
-    INNER = "inner"
-    MIDDLE = "middle"
-    LAWS = "laws"
-
-
 @commands.command()
 def calibrate(
     source: LineFiles,
     out: Annotated[Path, typer.Argument(metavar="OUT", help="Folder for camera files.")],
     size: Size,
-    labels: Annotated[LabelChecking, typer.Option(help="checked leaves out wrong labels.")] = (
-        LabelChecking.CHECKED
-    ),
+    labels: Annotated[
+        Literal["checked", "given"], typer.Option(help="checked leaves out wrong labels.")
+    ] = "checked",
     goal: Annotated[
-        GoalEdgeOption,
+        GoalEdge,
         typer.Option(
             help="What is clicked of goals: their inner edges, or their middle; laws is the middle, "
             "and lines whose outer edges make the pitch, as on grass."
         ),
-    ] = GoalEdgeOption.MIDDLE,
+    ] = "middle",
     leave_one_out: Annotated[
         bool, typer.Option("--leave-one-out", help="Also calibrate without each marking in turn.")
     ] = False,
@@ -97,8 +75,8 @@ def calibrate(
             source,
             out,
             size=size,
-            labels=labels.value,
-            goal=goal.value,
+            labels=labels,
+            goal=goal,
             with_leave_one_out=leave_one_out,
             matches=named,
             guess=matches == "auto",
@@ -246,7 +224,7 @@ def cameras(
         Path, typer.Argument(metavar="OUT", help="The npz, or a folder for OpenTrackIO's samples.")
     ],
     format_: Annotated[
-        CameraFormat,
+        Literal["npz", "opentrackio"],
         typer.Option("--format", help="npz: K, k, R, t of each frame; opentrackio: a JSON each."),
     ],
     size: Annotated[
@@ -261,7 +239,7 @@ def cameras(
     """
     from app.features.file_tools.camera_export import export_cameras
 
-    result = export_cameras(source, out, format_.value, size)
+    result = export_cameras(source, out, format_, size)
     if json_:
         print_json(result)
         return

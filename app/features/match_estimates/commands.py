@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -18,7 +18,6 @@ from app.wording import plural
 if TYPE_CHECKING:
     from app.features.match_estimates.pictures import MatchPictureGeometryState
     from app.features.pitches.service import DatasetPitches, PitchState
-from enum import StrEnum
 
 if TYPE_CHECKING:
     from app.features.policies.noise import NoiseReport
@@ -362,18 +361,11 @@ def _print_noise(found: NoiseReport) -> None:
         say(sentence)
 
 
-class AcceptedRigPart(StrEnum):
-    """What of a proposal is saved."""
-
-    CAMERAS = "cameras"
-    SIGMA = "sigma"
-
-
 @commands.command()
 def rig(
     dataset: Dataset,
     accept: Annotated[
-        AcceptedRigPart | None,
+        Literal["cameras", "sigma"] | None,
         typer.Option(
             help="Save the adjusted cameras, or only how far the cameras in use may be off."
         ),
@@ -409,8 +401,8 @@ def rig(
             return
         proposed = propose_adjustment(store, dataset, lines)
         if accept is not None:
-            accept_rig(store, proposed, accept.value, actor=get_current_actor())
-    values = {**rig_proposal_to_json(proposed), "accepted": accept and accept.value}
+            accept_rig(store, proposed, accept, actor=get_current_actor())
+    values = {**rig_proposal_to_json(proposed), "accepted": accept}
     if json_:
         print_json(values)
     else:

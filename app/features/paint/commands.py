@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import typer
 
@@ -28,13 +27,6 @@ Tripod = Annotated[
         "camera (match) of each frame. Their pitch is found together, and their covariances know it.",
     ),
 ]
-
-
-class TrackPitchChoice(StrEnum):
-    """Of which pitch the cameras of a clip are."""
-
-    PLAN = "plan"
-    SHOWN = "shown"
 
 
 Images = Annotated[
@@ -284,12 +276,12 @@ def track(
         ),
     ] = None,
     pitch: Annotated[
-        TrackPitchChoice,
+        Literal["plan", "shown"],
         typer.Option(
             help="plan: cameras lay the markings of 105 x 68 m on the paint; shown: they are those "
             "of the pitch that the clip shows, of its own length, width and crown (track.json)."
         ),
-    ] = TrackPitchChoice.PLAN,
+    ] = "plan",
     turn: Annotated[
         bool,
         typer.Option(
@@ -307,7 +299,7 @@ def track(
     from app.features.file_tools.track import count_outcomes, track_cameras_of_clip
 
     with show_progress("Tracking") as progress:
-        on_shown = pitch is TrackPitchChoice.SHOWN
+        on_shown = pitch == "shown"
         result = track_cameras_of_clip(
             clip, out, lines or (), on_shown=on_shown, turn=turn, progress=progress
         )

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -206,23 +205,16 @@ def _give_role(name: str, dataset: str, role: Role | None, json_: bool) -> None:
     print_values({"name": one.name, "dataset": dataset, "role": str(one.role)}, json_)
 
 
-class Switch(StrEnum):
-    """Whether something counts."""
-
-    ON = "on"
-    OFF = "off"
-
-
 @commands.command("require-second-factor")
 def require_second_factor(
-    switch: Annotated[Switch, typer.Argument(metavar="on|off")], json_: Json = False
+    switch: Annotated[Literal["on", "off"], typer.Argument(metavar="on|off")], json_: Json = False
 ) -> None:
     """Let everybody need a second factor: whoever has none makes one before anything else."""
     from app.features.people.second_factor import SecondFactors
 
     with open_store() as store:
-        SecondFactors(store).set_required(switch is Switch.ON, actor=get_current_actor())
-    print_values({"second_factor_required": switch is Switch.ON}, json_)
+        SecondFactors(store).set_required(switch == "on", actor=get_current_actor())
+    print_values({"second_factor_required": switch == "on"}, json_)
 
 
 @commands.command()

@@ -18,9 +18,10 @@ from app.paint.view_proposal import (
     propose_lines_in_image,
 )
 from app.soccer.annotation import Lines, make_lines
+from app.soccer.choices import GoalEdge
 from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.paint_evidence import POINTS_PER_MARKING
-from app.soccer.pitch import GoalEdge, Pitch, opposite_marking
+from app.soccer.pitch import Pitch, opposite_marking
 from app.soccer.policy import PAPER, CalibrationPolicy
 from app.solving.calibrate import calibrate
 from tests.cameras import SIZE

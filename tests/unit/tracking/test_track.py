@@ -10,8 +10,9 @@ import pytest
 
 from app.errors import ImageError, InputError
 from app.soccer.annotation import Lines, make_lines
+from app.soccer.choices import GoalEdge
 from app.soccer.frames import ImagePoint, ImageSize
-from app.soccer.pitch import GoalEdge, Pitch
+from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.jaccard import project_markings
 from app.tracking import track
