@@ -38,7 +38,7 @@ class MarkingFit:
     """One marking of one view: where the camera puts it and how far the annotation is off.
 
     Attributes:
-        outcome: ``tp``, ``fp`` or ``fn`` at the policy's gamma, as JaC counts it.
+        outcome: ``tp``, ``fp`` or ``fn`` as JaC counts it at the first of ``GAMMAS_PERCENT``.
         distances_px: Distance of each annotated point to the projected polyline; empty when
             the marking is not annotated or not visible.
         nearest: The closest place on the polyline for each annotated point, to a thousandth of a

@@ -149,7 +149,9 @@ class MarkingFitDocument(Document):
     """Where the camera puts a marking, and how far its annotated points are off."""
 
     marking: str
-    outcome: str = Field(description="`tp`, `fp` or `fn`, as JaC counts it.")
+    outcome: str = Field(
+        description="`tp`, `fp` or `fn`, as JaC counts it at 0.5 % of the diagonal."
+    )
     used: bool
     largest_px: float | None
     distances_px: list[Measured]

@@ -41,7 +41,7 @@ from app.soccer.codec import group_from_json, group_to_json
 from app.soccer.group import Group, Station
 from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
-from app.soccer.solution import GAMMAS_PERCENT, Calibration, Solution
+from app.soccer.solution import Calibration, Solution
 from app.solving.calibrate import (
     calibrate_station,
     compute_calibration_key,
@@ -67,14 +67,19 @@ def find_contradicted_cameras(
         stations: Cameras, each with a pitch that it shows.
         policy: With the gate of JaC that they fail.
     """
-    gamma, found = GAMMAS_PERCENT.index(policy.jac_gamma_percent), dict[str, float]()
+    found = dict[str, float]()
     for station, pitch in stations:
         is_given = station.given is not None and station.calibration == "given"
         if not (station.shared and station.lines and is_given):
             continue
-        jac = calibrate_station(station, pitch, policy.calibration).jac
-        if jac is not None and jac[gamma] <= policy.min_jac:
-            found[station.key] = jac[gamma]
+        fitted = calibrate_station(station, pitch, policy.calibration)
+        if fitted.jac is None:
+            continue
+        gamma_px = policy.jac_gamma_percent / 100 * station.size.diagonal
+        close = sum(fit.counted_px < gamma_px for fit in fitted.markings)
+        jac = close / max(len(fitted.markings), 1)
+        if jac <= policy.min_jac:
+            found[station.key] = jac
     return found
 
 

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
 from multiprocessing import get_context
 
 import pytest
@@ -12,11 +13,21 @@ from app.features.groups.submit import load_group_state, submit_edit
 from app.features.queue.service import list_groups
 from app.features.solutions import service as module
 from app.features.solutions.queries import EncodedSolution
-from app.features.solutions.service import list_stale_groups, solve_and_encode, solve_dataset
-from app.soccer.group import Group
-from app.soccer.policy import Policy
-from app.soccer.solution import Calibration, Solution
+from app.features.solutions.service import (
+    find_contradicted_cameras,
+    list_stale_groups,
+    solve_and_encode,
+    solve_dataset,
+)
+from app.soccer.annotation import make_lines
+from app.soccer.group import Group, Station
+from app.soccer.pitch import Pitch
+from app.soccer.policy import PAPER, Policy
+from app.soccer.solution import GAMMAS_PERCENT, Calibration, Solution
+from app.solving.calibrate import calibrate_station
 from app.solving.solve import solve_group
+from tests.cameras import SIZE
+from tests.unit.solving.conftest import MAIN, click
 
 
 def stumbling(
@@ -122,3 +133,28 @@ class TestSolveDataset:
         assert state.solution == solve_group(state.group, state.policy)
         (row,) = list_groups(store, state.dataset_id, "key:12").items
         assert row.solved
+
+
+class TestContradictedCameras:
+    @pytest.fixture
+    def station(self) -> Station:
+        """A static camera whose lines lie 9 px below the given camera's: 0.61 % of the diagonal."""
+        moved = {name: [(x, y + 9.0) for x, y in points] for name, points in click(MAIN).items()}
+        return Station(
+            "cam1", SIZE, shared=True, lines=make_lines(moved), given=MAIN, calibration="given"
+        )
+
+    @pytest.mark.parametrize("gamma", GAMMAS_PERCENT)
+    def test_jac_is_that_of_the_calibration(self, station: Station, gamma: float) -> None:
+        policy = replace(PAPER, jac_gamma_percent=gamma, min_jac=1.0)
+        jac = calibrate_station(station, Pitch(), policy.calibration).jac
+        assert jac is not None
+        found = find_contradicted_cameras([(station, Pitch())], policy)
+        assert found == {"cam1": jac[GAMMAS_PERCENT.index(gamma)]}
+
+    @pytest.mark.parametrize(("gamma", "named"), [(0.5, 1), (0.55, 1), (0.75, 0), (5.0, 0)])
+    def test_gamma_may_be_any_that_a_policy_has(
+        self, station: Station, gamma: float, named: int
+    ) -> None:
+        policy = replace(PAPER, jac_gamma_percent=gamma, min_jac=0.3)
+        assert len(find_contradicted_cameras([(station, Pitch())], policy)) == named
