@@ -7,7 +7,7 @@ says who is right: every number is the same when both change places, but those t
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -16,10 +16,11 @@ from scipy.special import chdtrc
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
-from app.geometry.polyline import distance_to_polyline
+from app.geometry.polyline import distance_to_polyline, trace_ellipse_arc
 from app.soccer.annotation import BallAnnotation, Lines
 from app.soccer.frames import ImagePoint
 from app.soccer.group import Group, View
+from app.soccer.pitch import CIRCLES
 from app.soccer.solution import GAMMAS_PERCENT, Ball3D, Calibration, Solution
 from app.solving.jaccard import camera_jaccard, measure_markings, project_markings
 
@@ -162,8 +163,8 @@ def compare_annotations(
 def compare_lines(a: Lines, b: Lines) -> tuple[LineDistance, ...]:
     """Every marking that either drew, by name.
 
-    The distance goes from the points of each to the polyline of the other. Points beyond the
-    other's ends do not count: how long a line is drawn does not say where it lies.
+    The distance goes from the points of each to the polyline of the other, of a circle also to the
+    arc of the ellipse on which the other's points lie: what is nearer counts. Points beyond the other's ends do not count: how long a line is drawn does not say where it lies.
     """
     found = []
     for marking in sorted({*a, *b}):
@@ -174,8 +175,8 @@ def compare_lines(a: Lines, b: Lines) -> tuple[LineDistance, ...]:
                 found.append(LineDistance(marking, only))
             continue
         there, back = (
-            _measure_distances_within_line_ends(first, second),
-            _measure_distances_within_line_ends(second, first),
+            _measure_distances_within_line_ends(first, _list_lines(second, marking)),
+            _measure_distances_within_line_ends(second, _list_lines(first, marking)),
         )
         if not len(there) + len(back):
             # Drawn one behind the other: what is left is how far apart they are.
@@ -269,14 +270,25 @@ def _get_marking_points(lines: Lines, marking: str) -> FloatArray:
     return np.array(lines.get(marking) or (), dtype=float).reshape(-1, 2)
 
 
-def _measure_distances_within_line_ends(points: FloatArray, line: FloatArray) -> FloatArray:
-    """Distances of the points that lie beside a polyline, not beyond its ends, shape (<= N,)."""
-    if len(line) < 2:
-        return distance_to_polyline(points, line)[0]
-    apart, nearest = distance_to_polyline(points, line)
+def _list_lines(points: FloatArray, marking: str) -> list[FloatArray]:
+    """Polylines through the points of a marking: of a circle its chords and, where there is one, its arc."""
+    arc = trace_ellipse_arc(points) if marking in CIRCLES else None
+    return [points] if arc is None else [points, arc]
+
+
+def _measure_distances_within_line_ends(
+    points: FloatArray, lines: Sequence[FloatArray]
+) -> FloatArray:
+    """Distances of the points that lie beside the nearest of polylines, not beyond its ends, shape (<= N,)."""
+    if len(lines[0]) < 2:
+        return distance_to_polyline(points, lines[0])[0]
+    measured = [distance_to_polyline(points, line) for line in lines]
+    apart: FloatArray = np.min([distances for distances, _ in measured], axis=0)
     beyond = np.zeros(len(points), bool)
-    for end, inward in ((line[0], line[1] - line[0]), (line[-1], line[-2] - line[-1])):
-        beyond |= (nearest == end).all(axis=1) & ((points - end) @ inward < 0)
+    for line, (distances, nearest) in zip(lines, measured, strict=True):
+        for end, inward in ((line[0], line[1] - line[0]), (line[-1], line[-2] - line[-1])):
+            at_end = (distances == apart) & (nearest == end).all(axis=1)
+            beyond |= at_end & ((points - end) @ inward < 0)
     return apart[~beyond]
 
 
@@ -407,18 +419,24 @@ def _find_first_ball_center(view: View) -> ImagePoint | None:
 def _measure_line_distances(view: View, other: View) -> list[float]:
     """Mean distance of each marking that both have, from either to the other, pixels."""
     mine, theirs = view.station.lines, other.station.lines
-    return [polyline_distance(mine[name], theirs[name]) for name in mine if name in theirs]
+    return [
+        measure_marking_distance(name, mine[name], theirs[name]) for name in mine if name in theirs
+    ]
 
 
-def polyline_distance(one: tuple[ImagePoint, ...], other: tuple[ImagePoint, ...]) -> float:
-    """Mean distance of the points of two polylines from the other one, pixels.
+def measure_marking_distance(
+    marking: str, one: tuple[ImagePoint, ...], other: tuple[ImagePoint, ...]
+) -> float:
+    """Mean distance of the points that two drew of a marking from the other's line, pixels.
 
     Both ways, so that neither a short piece of a long line nor the long line is nearer.
     """
     a, b = (np.array([(p.x, p.y) for p in points], dtype=float) for points in (one, other))
-    return float(
-        np.concatenate([_distances_from_polyline(a, b), _distances_from_polyline(b, a)]).mean()
-    )
+    apart = [
+        np.min([_distances_from_polyline(points, line) for line in lines], axis=0)
+        for points, lines in ((a, _list_lines(b, marking)), (b, _list_lines(a, marking)))
+    ]
+    return float(np.concatenate(apart).mean())
 
 
 def _distances_from_polyline(points: FloatArray, line: FloatArray) -> FloatArray:

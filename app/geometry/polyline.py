@@ -1,4 +1,4 @@
-"""Polylines in an image: clipping at the border, distance of points."""
+"""Polylines in an image: clipping at the border, distance of points, the arc along points."""
 
 from __future__ import annotations
 
@@ -7,6 +7,15 @@ import numpy.typing as npt
 from numba import njit
 
 from app.geometry.arrays import FloatArray, require_shape
+
+_LEAST_POINTS = 5
+"""So many points determine a conic."""
+_ARC_POINTS = 360
+"""Of an arc: its chords leave it by hundredths of a pixel."""
+_NEAR = 0.05
+"""Farther than this share of the extent of the points none of them lies from their arc."""
+_LEAST_WIDTH = 1e-9
+"""Narrower than this share of their extent points lie on a straight line."""
 
 
 def is_inside_image(points: FloatArray, width: int, height: int) -> npt.NDArray[np.bool_]:
@@ -137,3 +146,65 @@ def find_border_crossing(within, outside, width, height, place):
             least, found = squared, 1
             place[0], place[1] = x, y
     return found
+
+
+def trace_ellipse_arc(points: FloatArray) -> FloatArray | None:
+    """The arc of an ellipse along points in any order, as a polyline.
+
+    It goes from the one end of the points to the other: the widest gap between them stays open.
+
+    Args:
+        points: Pixels, shape (N, 2).
+
+    Returns:
+        Shape (360, 2); None where fewer than five points are given or they lie on no ellipse.
+
+    Source: R. Halir, J. Flusser, "Numerically stable direct least squares fitting of ellipses", 1998.
+    """
+    points = require_shape(points, (None, 2), "points")
+    if len(points) < _LEAST_POINTS:
+        return None
+    center = points.mean(axis=0)
+    # The fit is the same in all affine frames; in that of the points nothing cancels.
+    _, sizes, axes = np.linalg.svd(points - center, full_matrices=False)
+    if not sizes[1] > _LEAST_WIDTH * sizes[0]:
+        return None
+    frame = axes * (sizes / np.sqrt(len(points)))[:, None]
+    found = _fit_ellipse((points - center) @ np.linalg.inv(frame))
+    if found is None:
+        return None
+    middle, root, angles = found
+    angles = np.sort(angles)
+    gaps = np.diff(angles, append=angles[0] + 2 * np.pi)
+    widest = int(np.argmax(gaps))
+    first = angles[(widest + 1) % len(angles)]
+    turn = np.linspace(first, first + 2 * np.pi - gaps[widest], _ARC_POINTS)
+    circle = np.column_stack([np.cos(turn), np.sin(turn)])
+    arc: FloatArray = center + (middle + circle @ np.linalg.inv(root)) @ frame
+    far = distance_to_polyline(points, arc)[0].max()
+    return arc if far <= _NEAR * np.linalg.norm(np.ptp(points, axis=0)) else None
+
+
+def _fit_ellipse(points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Centre c, shape (2,), and R, shape (2, 2), with which (p - c) R lies on the unit circle for
+    points p of the ellipse, and the angles there of the given ones, shape (N,)."""
+    x, y = points.T
+    square, linear = (
+        np.column_stack([x * x, x * y, y * y]),
+        np.column_stack([x, y, np.ones(len(x))]),
+    )
+    try:
+        back = -np.linalg.solve(linear.T @ linear, linear.T @ square)
+        scatter = square.T @ square + square.T @ linear @ back
+        _, vectors = np.linalg.eig(np.array([scatter[2] / 2, -scatter[1], scatter[0] / 2]))
+        vectors = vectors.real
+        (best,) = np.flatnonzero(4 * vectors[0] * vectors[2] - vectors[1] ** 2 > 0)[:1]
+        a, b, c = vectors[:, best] * np.sign(vectors[0, best])
+        d, e, f = back @ (a, b, c)
+        form = np.array([[a, b / 2], [b / 2, c]])
+        middle = -np.linalg.solve(form, (d, e)) / 2
+        root = np.linalg.cholesky(form / (middle @ form @ middle - f))
+    except (np.linalg.LinAlgError, ValueError):
+        return None
+    u, v = ((points - middle) @ root).T
+    return middle, root, np.arctan2(v, u)

@@ -11,19 +11,24 @@ from app.evaluation.annotation_distance import (
     compare_balls,
     compare_balls_3d,
     compare_lines,
+    measure_marking_distance,
 )
 from app.evaluation.rater_agreement import (
     AgreementLimits,
     compute_medians_and_tails,
     find_disagreements,
 )
-from app.soccer.annotation import BallAnnotation, make_lines
+from app.soccer.annotation import BallAnnotation, Lines, make_lines
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group
+from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.soccer.solution import Ball3D
+from app.solving.jaccard import project_markings
 from app.solving.solve import solve_group
+from tests.cameras import SIZE
 from tests.scenes import make_scenes
+from tests.unit.solving.conftest import MAIN
 
 LINE = "Side line top"
 
@@ -63,6 +68,46 @@ class TestCompareLines:
     def test_is_the_same_when_both_change_places(self) -> None:
         a, b = drawn((0, 0), (30, 4), (90, 9)), drawn((5, 2), (70, 13))
         assert compare_lines(a, b) == compare_lines(b, a)
+
+
+class TestCircles:
+    """Two who click exactly along a circle, each at other places of it."""
+
+    PATH = project_markings(MAIN, Pitch(), SIZE)["Circle right"]
+
+    def clicks(self, count: int, moved: float = 0.0, name: str = "Circle right") -> Lines:
+        chosen = self.PATH[np.linspace(0, len(self.PATH) - 1, count).astype(int)]
+        return make_lines({name: [(x, y + moved) for x, y in chosen.tolist()]})
+
+    def test_who_clicks_exactly_agrees_with_whoever_clicks_elsewhere(self) -> None:
+        largest, means = {}, {}
+        for name in ("Middle line", "Circle right"):
+            mine, theirs = self.clicks(8, name=name), self.clicks(11, name=name)
+            (found,) = compare_lines(mine, theirs)
+            largest[name] = found.largest_px or 0.0
+            means[name] = measure_marking_distance(name, mine[name], theirs[name])
+        assert largest["Circle right"] < 0.2 < 1.0 < largest["Middle line"]
+        assert means["Circle right"] < 0.1 < 0.5 < means["Middle line"]
+
+    def test_who_clicks_the_same_is_nothing_apart(self) -> None:
+        (found,) = compare_lines(self.clicks(8), self.clicks(8))
+        assert found.largest_px == 0.0
+
+    def test_the_order_of_clicks_does_not_count(self) -> None:
+        ((name, points),) = self.clicks(11).items()
+        (found,) = compare_lines(self.clicks(8), {name: (*points[1::2], *points[::2])})
+        assert found.largest_px is not None and found.largest_px < 0.2
+
+    def test_a_circle_that_is_moved_lies_apart(self) -> None:
+        (found,) = compare_lines(self.clicks(8), self.clicks(11, moved=6.0))
+        assert found.largest_px == pytest.approx(6.0, abs=1.0)
+
+    def test_fewer_than_five_points_are_joined_by_chords(self) -> None:
+        straight, bent = (
+            compare_lines(self.clicks(4, name=name), self.clicks(3, name=name))[0].largest_px
+            for name in ("Middle line", "Circle right")
+        )
+        assert straight == bent
 
 
 class TestCompareBalls:

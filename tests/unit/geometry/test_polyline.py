@@ -1,6 +1,9 @@
 import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from app.geometry.polyline import clip_polyline, distance_to_polyline
+from app.geometry.polyline import clip_polyline, distance_to_polyline, trace_ellipse_arc
 
 
 class TestClipPolyline:
@@ -46,3 +49,50 @@ class TestDistanceToPolyline:
     def test_a_single_point_is_a_polyline(self):
         distances, _ = distance_to_polyline(np.array([[3.0, 4.0]]), np.zeros((1, 2)))
         assert np.allclose(distances, [5.0])
+
+
+def arc(first: float, last: float, count: int, flat: float = 0.2, lean: float = 0.3):
+    """Points on an arc of a leaning ellipse, degrees."""
+    turn = np.radians(np.linspace(first, last, count))
+    x, y = 200.0 * np.cos(turn), 200.0 * flat * np.sin(turn)
+    c, s = np.cos(lean), np.sin(lean)
+    return np.column_stack([400 + c * x - s * y, 300 + s * x + c * y])
+
+
+class TestTraceEllipseArc:
+    @given(
+        st.floats(0, 360),
+        st.floats(60, 270),
+        st.integers(5, 12),
+        st.floats(0.1, 1.0),
+        st.floats(0, 3),
+    )
+    def test_goes_along_the_arc_from_end_to_end(self, first, span, count, flat, lean) -> None:
+        points = arc(first, first + span, count, flat, lean)
+        found = trace_ellipse_arc(points)
+        assert found is not None and found.shape == (360, 2)
+        between = arc(first, first + span, 50, flat, lean)
+        assert distance_to_polyline(between, found)[0].max() < 0.1
+        for end in (points[0], points[-1]):
+            assert np.linalg.norm(found[[0, -1]] - end, axis=1).min() < 0.01
+
+    def test_the_order_of_the_points_does_not_count(self) -> None:
+        points = arc(20, 200, 8)
+        shuffled = points[[3, 0, 7, 5, 1, 6, 2, 4]]
+        found, again = trace_ellipse_arc(points), trace_ellipse_arc(shuffled)
+        assert found is not None and again is not None
+        assert distance_to_polyline(found, again)[0].max() < 0.01
+
+    @pytest.mark.parametrize(
+        "points",
+        [
+            np.empty((0, 2)),
+            arc(0, 90, 4),
+            np.zeros((6, 2)),
+            np.column_stack([np.arange(7.0), 2 * np.arange(7.0)]),
+            arc(0, 180, 12) + np.array([[0, 99], [0, -99]] * 6),
+        ],
+        ids=["none", "four", "one place", "straight", "no ellipse"],
+    )
+    def test_what_lies_on_no_ellipse_has_none(self, points) -> None:
+        assert trace_ellipse_arc(points) is None

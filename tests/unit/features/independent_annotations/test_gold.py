@@ -1,13 +1,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from random import Random
 
 import numpy as np
 import pytest
 
 from app.errors import ConflictError, InputError, NotFoundError
-from app.evaluation.annotation_distance import polyline_distance
+from app.evaluation.annotation_distance import measure_marking_distance
 from app.features.groups.edit import SetLines, make_set_ball_edit
 from app.features.groups.history import read_history
 from app.features.groups.submit import load_group_state, submit_edit
@@ -198,9 +199,10 @@ class TestNumbers:
         long = (ImagePoint(0.0, 0.0), ImagePoint(10.0, 0.0))
         short = (ImagePoint(0.0, 2.0), ImagePoint(5.0, 2.0))
         both = [2.0, 2.0, 2.0, float(np.hypot(5.0, 2.0))]
-        assert polyline_distance(long, short) == pytest.approx(np.mean(both))
-        assert polyline_distance(short, long) == polyline_distance(long, short)
-        assert polyline_distance(long[:1], short[:1]) == 2.0
+        measure = partial(measure_marking_distance, "Middle line")
+        assert measure(long, short) == pytest.approx(np.mean(both))
+        assert measure(short, long) == measure(long, short)
+        assert measure(long[:1], short[:1]) == 2.0
 
     def test_an_interval_holds_the_median_as_often_as_it_says(self) -> None:
         chance = np.random.default_rng(5)
