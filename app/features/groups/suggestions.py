@@ -257,7 +257,13 @@ def _suggest_drawing_or_hiding_markings(
             yield _SuggestionCandidate(
                 describe_condition(group, hide, max(fit.length_px, 1.0)), hide
             )
-    if not undrawn or undrawn[0].length_px < shortest or camera is None:
+    if camera is None:
+        return
+    fitted = group.pitch.with_goal_edge(solved.calibration.goal)
+    seen = project_markings(camera, fitted, view.size)
+    # JaC counts what the evaluator's edges show; of the edges in use the picture may show nothing.
+    undrawn = [fit for fit in undrawn if fit.marking in seen]
+    if not undrawn or undrawn[0].length_px < shortest:
         return
     letter = make_view_letter(group.views.index(view))
     names = [
@@ -265,8 +271,6 @@ def _suggest_drawing_or_hiding_markings(
     ]
     verb = "were" if len(names) > 1 else "was"
     advice = f"{' and '.join(names)} {verb} drawn in {letter}"
-    fitted = group.pitch.with_goal_edge(solved.calibration.goal)
-    seen = project_markings(camera, fitted, view.size)
     drawn = {fit.marking: _sample_clicks_along_polyline(seen[fit.marking]) for fit in undrawn}
     fix = SuggestedFix("draw_marking", view.key, undrawn[0].marking)
     yield _SuggestionCandidate(advice, fix, trial=SetLines(view.key, drawn))

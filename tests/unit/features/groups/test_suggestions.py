@@ -164,6 +164,27 @@ class TestFindRemedies:
         sentences = " ".join(remedy.sentence for remedy in remedies)
         assert not any(f"{marking} (visible" in sentences for marking in missing)
 
+    def test_what_the_edges_in_use_do_not_show_is_not_to_be_drawn(self, monkeypatch):
+        """JaC counts the evaluator's edges: one that just reaches into the picture is missed."""
+        bad, policy, missing = self.undrawn()
+        solution = solve_group(bad, policy)
+        look = remedies.project_markings
+
+        def without(names):
+            def project(*arguments):
+                return {name: at for name, at in look(*arguments).items() if name not in names}
+
+            monkeypatch.setattr(remedies, "project_markings", project)
+            return [
+                item.sentence
+                for item in find_suggestions(bad, policy, solution)
+                if item.fix.action == "draw_marking"
+            ]
+
+        (sentence,) = without(missing[:1])
+        assert missing[0] not in sentence and missing[1] in sentence
+        assert without(look(MAIN, Pitch(), SIZE) | look(BEHIND_GOAL, Pitch(), SIZE)) == []
+
     def test_a_view_that_was_left_out_can_be_used_again(self):
         good = group(view("a", MAIN, BALL), view("b", BEHIND_GOAL, BALL))
         bad = good.with_view(replace(good.views[1], included=False))
