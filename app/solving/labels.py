@@ -33,7 +33,7 @@ RELABELLED = 1.5
 """The points of a relabelled marking lie within this, which counts as evidence."""
 NEAREST = 8.0
 """A class is proposed without being evidence when the points lie within this and only half as
-far as from any other class: what is left out is extrapolated, circles above all."""
+far as from any other class, the present one too: what is left out is extrapolated, circles above all."""
 DECISIVE = 0.35
 """Without a class that fits, the cost must fall to this share to suspect a marking."""
 MAX_SUSPECTS = 3
@@ -210,7 +210,8 @@ class _LabelSearch:
             return _SuspectMarking(marking, error, None, np.inf)
         nearest, best = ranked[0]
         rival = ranked[1][0] if len(ranked) > 1 else np.inf
-        plausible = nearest <= RELABELLED or (nearest <= NEAREST and 2 * nearest < rival)
+        fits = nearest <= RELABELLED and nearest < error
+        plausible = fits or (nearest <= NEAREST and 2 * nearest < min(rival, error))
         return _SuspectMarking(marking, error, best if plausible else None, nearest)
 
     def measure_largest_distances(

@@ -13,7 +13,9 @@ from app.soccer.policy import CalibrationPolicy
 from app.solving.labels import (
     GAMMA_SHARE,
     MISFIT,
+    RELABELLED,
     _find_markings_on_minority_half,
+    _LabelSearch,
     _order_by_suspicion,
     _pitch_half,
     find_suspects,
@@ -71,6 +73,34 @@ class TestFindSuspects:
         )
         observations, fit, (found, rest, named) = suspects(lines)
         assert (found is fit, rest is observations, named) == (True, True, ())
+
+
+class TestOtherLabels:
+    @pytest.mark.parametrize(
+        ("error", "nearest", "named"),
+        [
+            (5.0, 5.5, False),
+            (5.0, 5.0, False),
+            (5.0, 3.0, False),
+            (5.0, 2.4, True),
+            (2.0, RELABELLED, True),
+            (RELABELLED, RELABELLED, False),
+        ],
+    )
+    def test_a_class_is_proposed_only_where_it_fits_better_than_the_present_one(
+        self, monkeypatch, error, nearest, named
+    ):
+        observations = make_observations(click(MAIN), PITCH, SIZE)
+        distances = {"Side line top": error, "Side line bottom": nearest}
+        monkeypatch.setattr(
+            _LabelSearch,
+            "measure_largest_distance",
+            lambda _self, _parameters, of: distances.get(of.markings[0], 99.0),
+        )
+        search, fit = _LabelSearch(PROBLEM, GAMMA), PROBLEM.search(observations)
+        rest = observations.without("Side line top", "Side line bottom")
+        doubt = search.compare_with_other_labels(observations, rest, fit, "Side line top")
+        assert doubt.suggested == ("Side line bottom" if named else None)
 
 
 class TestOrder:
