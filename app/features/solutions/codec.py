@@ -23,7 +23,7 @@ from app.json_text import prepare_msgspec_type
 from app.soccer.codec import camera_from_json, camera_to_json
 from app.soccer.frames import ImagePoint, height_above_grass
 from app.soccer.group import Group
-from app.soccer.solution import BallFit, Gate, Solution, ViewSolution
+from app.soccer.solution import BallFit, Calibration, Gate, Solution, ViewSolution
 
 T = TypeVar("T")
 Codec = tuple[Callable[[Any], Any], Callable[[Any], Any]]
@@ -181,7 +181,7 @@ class SolutionSummary:
             threshold (``solution.compute_margin``), negative when it fails.
         value: The margin without its sign: how close the group is to passing, or to failing.
             Where it is small, a small mistake decides.
-        min_jac: The lowest JaC of the views at 0.5 %.
+        min_jac: The lowest JaC of the views in use at 0.5 %.
         parallax_degrees: Of the ball, like ``sigma_m`` and ``height_m``.
         error_px: The larger reprojection error of the best pair, which the gate of that name judges;
             ``error_percent`` the same in per cent of the diagonal.
@@ -221,7 +221,7 @@ def summarize_solution(group: Group, solution: Solution) -> SolutionSummary:
     error_px, error_percent = _reprojection_error(group, solution)
     return SolutionSummary(
         **_summarize_gate_columns(solution),
-        min_jac=_smallest_jac(solution),
+        min_jac=_find_smallest_jac(group, solution),
         error_px=error_px,
         error_percent=error_percent,
         sigma_m=_finite_or_none(ball.sigma_m) if ball else None,
@@ -271,16 +271,20 @@ def _gate_nearest_to_failing(gates: tuple[Gate, ...]) -> Gate | None:
     return min(measured, key=lambda gate: gate.margin or 0.0, default=None)
 
 
-def _smallest_jac(solution: Solution) -> float | None:
+def _find_smallest_jac(group: Group, solution: Solution) -> float | None:
     # The first of GAMMAS_PERCENT is the one that curation speaks of.
-    measured = (view.calibration.jac for view in solution.views)
+    measured = (item.jac for item in _list_calibrations_in_use(group, solution))
     return min((jac[0] for jac in measured if jac), default=None)
 
 
 def _find_smallest_agreement(group: Group, solution: Solution) -> float | None:
-    used = {view.key for view in group.views if view.included}
-    found = (view.calibration.agreement for view in solution.views if view.view in used)
+    found = (item.agreement for item in _list_calibrations_in_use(group, solution))
     return min((value for value in found if value is not None), default=None)
+
+
+def _list_calibrations_in_use(group: Group, solution: Solution) -> list[Calibration]:
+    used = {view.key for view in group.views if view.included}
+    return [view.calibration for view in solution.views if view.view in used]
 
 
 def _reprojection_error(group: Group, solution: Solution) -> tuple[float | None, float | None]:

@@ -84,11 +84,14 @@ def deciding(name: str) -> Callable[[Document], Any]:
 
 
 def of_views(path: str, choose: Callable[[list[Any]], Any]) -> Callable[[Document], Any]:
-    """What is chosen of a number of the views, those alone that have it."""
+    """What is chosen of a number of the views in use, those alone that have it."""
 
     def value(group: Document) -> Any:
         found = []
+        used = {view["key"] for view in group["views"] if view["included"]}
         for view in group["solution"]["views"]:
+            if view["view"] not in used:
+                continue
             inner: Any = view
             for name in path.split("/"):
                 inner = None if inner is None else inner[name]

@@ -237,6 +237,17 @@ class TestSummary:
         unseen = painted_views(solution, (PaintFit(None, None, 0, reason="no_frame"), None, None))
         assert summarize_solution(full_group, unseen).agreement is None
 
+    def test_min_jac_is_the_lowest_of_the_views_in_use(self, full_group, solution) -> None:
+        (left_out,) = [view.key for view in full_group.views if not view.included]
+        for key, lowest in ((left_out, 0.9), (full_group.views[0].key, 0.1)):
+            views = tuple(
+                replace(view, calibration=replace(view.calibration, jac=(0.1, 0.1, 0.1)))
+                if view.view == key
+                else view
+                for view in solution.views
+            )
+            assert summarize_solution(full_group, replace(solution, views=views)).min_jac == lowest
+
     def test_the_error_is_that_of_the_gate_with_and_without_a_ball(
         self, full_group, solution
     ) -> None:
