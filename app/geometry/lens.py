@@ -129,6 +129,9 @@ def _polynomial_roots(polynomial: np.polynomial.Polynomial) -> np.ndarray[Any, A
 
 
 _STEPS = 25
+_AGAIN_AT = 0.6
+"""Share of the fold from which a point is sought again that was not found from where it is seen: from
+beyond the fold Newton's method may run away."""
 _CLOSE, _THERE = 1e-9, 1e-15
 """How far, in normalised coordinates, a point may miss what it should be distorted to, and from where
 on no step is of use."""
@@ -197,21 +200,27 @@ def undistort_points(points, coefficients, fold, ideal):
     """Writes what is distorted to each point, by Newton's method; NaN where nothing within the fold is."""
     lens = read_lens_coefficients(coefficients)
     for row in range(len(points)):
-        x, y = points[row, 0], points[row, 1]
-        for _ in range(_STEPS):
+        share = 1.0
+        for _ in range(2):
+            x, y = share * points[row, 0], share * points[row, 1]
+            for _ in range(_STEPS):
+                u, v = distorted_fast(x, y, lens)
+                off_x, off_y = u - points[row, 0], v - points[row, 1]
+                ux, uy, vx, vy = slopes_fast(x, y, lens)
+                determinant = ux * vy - uy * vx
+                x -= (vy * off_x - uy * off_y) / determinant
+                y -= (ux * off_y - vx * off_x) / determinant
+                # A comparison with NaN is false: what is lost goes on to the end, and is none.
+                if abs(off_x) < _THERE and abs(off_y) < _THERE:
+                    break
             u, v = distorted_fast(x, y, lens)
-            off_x, off_y = u - points[row, 0], v - points[row, 1]
-            ux, uy, vx, vy = slopes_fast(x, y, lens)
-            determinant = ux * vy - uy * vx
-            x -= (vy * off_x - uy * off_y) / determinant
-            y -= (ux * off_y - vx * off_x) / determinant
-            # A comparison with NaN is false: what is lost goes on to the end, and is none.
-            if abs(off_x) < _THERE and abs(off_y) < _THERE:
+            found = abs(u - points[row, 0]) < _CLOSE and abs(v - points[row, 1]) < _CLOSE
+            if found and math.hypot(x, y) <= fold:
                 break
-        u, v = distorted_fast(x, y, lens)
-        found = abs(u - points[row, 0]) < _CLOSE and abs(v - points[row, 1]) < _CLOSE
-        if not (found and math.hypot(x, y) <= fold):
             x, y = math.nan, math.nan
+            share = _AGAIN_AT * fold / math.hypot(points[row, 0], points[row, 1])
+            if not share < 1:
+                break
         ideal[row, 0], ideal[row, 1] = x, y
 
 

@@ -8,6 +8,9 @@
 /** @typedef {[number, number]} Pair */
 
 const NEWTON_STEPS = 25;
+/** Share of the fold from which a point is sought again that was not found from where it is seen:
+ * from beyond the fold Newton's method may run away. */
+const AGAIN_AT = 0.6;
 
 /**
  * Distorted normalised coordinates of an ideal point.
@@ -61,8 +64,23 @@ function distortJacobian([x, y], coefficients) {
  */
 export function undistort([u, v], coefficients) {
 	if (!coefficients.some((value) => value !== 0)) return [u, v];
-	let x = u;
-	let y = v;
+	const found = searchIdeal([u, v], 1, coefficients);
+	if (found) return found;
+	const share = AGAIN_AT * foldRadius(coefficients) / Math.hypot(u, v);
+	return share < 1 ? searchIdeal([u, v], share, coefficients) : null;
+}
+
+/**
+ * The ideal point of a distorted one by Newton's method, from a share of the distorted point on.
+ *
+ * @param {Pair} point
+ * @param {number} share
+ * @param {number[]} coefficients
+ * @returns {Pair | null}
+ */
+function searchIdeal([u, v], share, coefficients) {
+	let x = share * u;
+	let y = share * v;
 	for (let step = 0; step < NEWTON_STEPS; step++) {
 		const [a, b] = distort([x, y], coefficients);
 		const errorX = a - u;

@@ -70,6 +70,14 @@ describe('undistort', () => {
 		assert.equal(undistort([0.9, 0], [-0.4, ...Array(11).fill(0)]), null);
 	});
 
+	it('finds what is seen beyond the fold and lies within it', () => {
+		const lens = [0.444, -0.121, 0, 0, 0.001, ...Array(7).fill(0)];
+		const fold = foldRadius(lens);
+		const ideal = [0.95 * fold, 0];
+		assert.ok(distort(ideal, lens)[0] > fold);
+		close(undistort(distort(ideal, lens), lens), ideal, 1e-6);
+	});
+
 	it('leaves a pixel alone without distortion', () => {
 		close(pixelToIdeal(cameraFromJson(mainCamera), { x: 479.5 + 1500, y: 269.5 }), [1, 0]);
 	});

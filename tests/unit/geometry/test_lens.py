@@ -50,6 +50,15 @@ class TestUndistort:
     def test_undoes_the_full_model(self):
         assert np.allclose(undistort(distort(POINTS, FULL), FULL), POINTS, atol=1e-10)
 
+    @pytest.mark.parametrize("terms", [(0.444, -0.121, 0.001), (0.274, 0.128, -0.044)])
+    def test_finds_what_is_seen_beyond_the_fold_and_lies_within_it(self, terms):
+        lens = np.zeros(12)
+        lens[[0, 1, 4]] = terms
+        ideal = np.column_stack([np.linspace(0.0, 0.97 * fold_radius(lens), 50), np.zeros(50)])
+        seen = distort(ideal, lens)
+        assert (seen[:, 0] > fold_radius(lens)).any()
+        assert np.allclose(undistort(seen, lens), ideal, atol=1e-6)
+
     def test_what_no_ideal_point_maps_to_is_nan(self):
         barrel = np.zeros(12)
         barrel[0] = -0.5
