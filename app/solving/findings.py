@@ -13,7 +13,7 @@ from app.solving.ball_3d import explain_implausible_position
 from app.solving.calibration_findings import find_calibration_findings, find_paint_findings
 from app.solving.chi_square import LOW_P_VALUE
 from app.solving.contradiction import SPEEDS, TYPICAL_SPEED, Contradiction
-from app.solving.gate_sentences import describe_odds
+from app.solving.gate_sentences import describe_odds, find_larger_error_in_tau
 from app.solving.sides import SwappedView, find_swapped_views
 from app.solving.triangulate import BallObservation
 from app.wording import format_degrees, format_metres, format_pixels, plural
@@ -57,8 +57,12 @@ def find_group_findings(
 ) -> tuple[Finding, ...]:
     """All findings of a group: what makes its ball unusable first, then what explains most."""
     swaps = {swap.view: swap for swap in _find_swapped_views(group, views, observations, policy)}
+    tau_px = {view.key: policy.tau_px(view.size.diagonal) for view in group.views}
     found: list[Finding] = []
     for view, solved in zip(group.views, views, strict=True):
+        # Of a view that a person left out nobody has to look at anything.
+        if not view.included:
+            continue
         noticed = find_calibration_findings(solved.calibration, view.size, view.key)
         # A static camera would say in every frame what nobody annotated in any.
         found.extend(
@@ -71,11 +75,11 @@ def find_group_findings(
         if view.key in swaps:
             found.append(_make_sides_swapped_finding(swaps[view.key]))
         else:
-            found.extend(_find_view_disagreement(group, view, solved, pairs, policy))
-            found.extend(_find_missed_ball(solved, policy.tau_px(view.size.diagonal)))
+            found.extend(_find_view_disagreement(group, view, solved, pairs, tau_px))
+            found.extend(_find_missed_ball(solved, tau_px[view.key]))
         found.extend(_find_wrong_ball_size(solved))
     if ball is None and not swaps:
-        found.extend(_find_unsynchronised_views(pairs, policy, group))
+        found.extend(_find_unsynchronised_views(pairs, tau_px, group))
     if contradicted is not None and not swaps:
         found.append(_make_contradiction_finding(contradicted, group, ball))
     if ball is not None:
@@ -86,8 +90,10 @@ def find_group_findings(
 
 
 def _finding_sort_key(finding: Finding) -> tuple[bool, int, float]:
-    """What comes first; of views that disagree the one that is farther off."""
-    far = (finding.number or 0.0) if finding.kind == "view_disagrees" else 0.0
+    """What comes first; of views that disagree the one that is farther off, in units of tau."""
+    far = 0.0
+    if finding.kind == "view_disagrees" and finding.number and finding.threshold:
+        far = finding.number / finding.threshold
     return not finding.is_unusable_ball, _BY_WEIGHT.index(finding.kind), -far
 
 
@@ -105,7 +111,8 @@ def _find_swapped_views(
     usable = [observation for observation in observations if observation.view in left]
     badly = {solved.view for solved in views if solved.failed == "jac"}
     doubtful = [observation for observation in observations if observation.view in badly]
-    return find_swapped_views(first, usable, group.pitch, policy, doubtful)
+    is_static = bool(group.views) and group.views[0].station.shared
+    return find_swapped_views(first, usable, group.pitch, policy, doubtful, is_static=is_static)
 
 
 def _find_several_balls(view: View) -> Iterator[Finding]:
@@ -149,7 +156,7 @@ def _find_view_disagreement(
     view: View,
     solved: ViewSolution,
     pairs: Sequence[TriangulatedPair],
-    policy: Policy,
+    tau_px: Mapping[str, float],
 ) -> Iterator[Finding]:
     """A view in no valid pair, though it was judged and others agree."""
     judged = [
@@ -158,13 +165,12 @@ def _find_view_disagreement(
     if solved.included or not judged or not any(pair.valid for pair in pairs):
         return
     letters = {other.key: make_view_letter(place) for place, other in enumerate(group.views)}
-    yield make_view_disagrees_finding(
-        view.key, find_closest_pair(judged), letters, policy.tau_px(view.size.diagonal)
-    )
+    best = find_closest_pair(judged, tau_px)
+    yield make_view_disagrees_finding(view.key, best, letters, tau_px)
 
 
 def make_view_disagrees_finding(
-    view: str, best: TriangulatedPair, letters: Mapping[str, str], tau_px: float
+    view: str, best: TriangulatedPair, letters: Mapping[str, str], tau_px: Mapping[str, float]
 ) -> Finding:
     """The finding about a view that misses the others' ball in its closest pair.
 
@@ -174,11 +180,11 @@ def make_view_disagrees_finding(
         view: Key of the view.
         best: The pair that it comes closest in.
         letters: What people call the views, by key.
-        tau_px: Largest error of a valid pair in the view, pixels.
+        tau_px: Largest error of a valid pair by view, pixels.
     """
     fix = SuggestedFix("exclude_view", view)
-    apart_px = max(best.errors_px)
-    if apart_px <= tau_px:
+    _, apart_px, limit_px = find_larger_error_in_tau(best, tau_px)
+    if apart_px <= limit_px:
         return Finding(
             "view_disagrees",
             "The ray of this view meets those of the others only behind a camera, where no ball "
@@ -188,14 +194,19 @@ def make_view_disagrees_finding(
         )
     other = best.b if best.a == view else best.a
     here, there = best.errors_px if best.a == view else best.errors_px[::-1]
+    allowed = f"at most {format_pixels(tau_px[view])} is allowed"
+    if tau_px[other] != tau_px[view]:
+        allowed = (
+            f"at most {format_pixels(tau_px[view])} and {format_pixels(tau_px[other])} are allowed"
+        )
     return Finding(
         "view_disagrees",
         f"This view does not see the ball where another view sees it: at best {format_pixels(here)} apart "
-        f"here and {format_pixels(there)} in {letters[other]}; at most {format_pixels(tau_px)} is allowed. Correct its "
+        f"here and {format_pixels(there)} in {letters[other]}; {allowed}. Correct its "
         "ball, or leave the view out.",
         view,
         number=apart_px,
-        threshold=tau_px,
+        threshold=limit_px,
         fix=fix,
     )
 
@@ -236,7 +247,7 @@ def _find_wrong_ball_size(solved: ViewSolution) -> Iterator[Finding]:
 
 
 def _find_unsynchronised_views(
-    pairs: Sequence[TriangulatedPair], policy: Policy, group: Group
+    pairs: Sequence[TriangulatedPair], tau_px: Mapping[str, float], group: Group
 ) -> Iterator[Finding]:
     """Well calibrated views whose balls do not meet, from either side: another instant.
 
@@ -245,29 +256,35 @@ def _find_unsynchronised_views(
     judged = [pair for pair in pairs if pair.failed == "reprojection"]
     if not judged or all(view.station.shared for view in group.views):
         return
-    best = find_closest_pair(judged)
-    sizes = [view.size.diagonal for view in group.views if view.key in (best.a, best.b)]
-    error_px, tau_px = max(best.errors_px), policy.tau_px(max(sizes))
+    best = find_closest_pair(judged, tau_px)
+    _, error_px, limit_px = find_larger_error_in_tau(best, tau_px)
     apart = f"{format_pixels(best.errors_px[0])} and {format_pixels(best.errors_px[1])} apart"
     sentence = (
         f"The two views do not see the ball in the same place ({apart})"
         if len(group.views) == 2
         else f"No two views see the ball in the same place (the closest are {apart})"
     )
-    if error_px <= tau_px:
+    if error_px <= limit_px:
         sentence = "The rays of no two views meet in front of their cameras"
     yield Finding(
         "not_synchronous",
         f"{sentence}. First check that each ball is drawn on the ball. If so, compare "
         "players and clock: if they differ, the pictures show different instants.",
-        number=error_px if error_px > tau_px else None,
-        threshold=tau_px if error_px > tau_px else None,
+        number=error_px if error_px > limit_px else None,
+        threshold=limit_px if error_px > limit_px else None,
     )
 
 
-def find_closest_pair(pairs: Sequence[TriangulatedPair]) -> TriangulatedPair:
-    """The pair whose larger error is the smallest."""
-    return min(pairs, key=lambda pair: max(pair.errors_px))
+def find_closest_pair(
+    pairs: Sequence[TriangulatedPair], tau_px: Mapping[str, float]
+) -> TriangulatedPair:
+    """The pair whose larger error, in units of tau, is the smallest.
+
+    Args:
+        pairs: At least one.
+        tau_px: Largest error of a valid pair by view, pixels.
+    """
+    return min(pairs, key=lambda pair: find_larger_error_in_tau(pair, tau_px)[0])
 
 
 def _make_contradiction_finding(item: Contradiction, group: Group, ball: Ball3D | None) -> Finding:

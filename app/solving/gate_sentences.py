@@ -280,7 +280,7 @@ def make_reprojection_gate(
         tau_percent: The same, of the image diagonal of each view.
     """
     judged = [
-        (max(_compute_errors_in_tau(pair, tau_px), key=lambda share: share[0]), pair)
+        (find_larger_error_in_tau(pair, tau_px), pair)
         for pair in pairs
         if pair.failed in (None, "reprojection")
     ]
@@ -316,15 +316,18 @@ def _format_percent_of_limit(share: float, limit: float) -> str:
     return f"{_format_beside_limit(value, limit) if round(value, 2) == round(limit, 2) else format_percent(value)} %"
 
 
-def _compute_errors_in_tau(
+def find_larger_error_in_tau(
     pair: TriangulatedPair, tau_px: Mapping[str, float]
-) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """For both views: error in units of tau, error, tau."""
-    first, second = tau_px[pair.a], tau_px[pair.b]
-    return (
-        (pair.errors_px[0] / first, pair.errors_px[0], first),
-        (pair.errors_px[1] / second, pair.errors_px[1], second),
-    )
+) -> tuple[float, float, float]:
+    """Of the view of a pair that is farther off: error in units of tau, error, tau (pixels).
+
+    Args:
+        pair: A pair of views.
+        tau_px: Largest error of a valid pair by view, pixels.
+    """
+    taus = tau_px[pair.a], tau_px[pair.b]
+    errors = ((error / tau, error, tau) for error, tau in zip(pair.errors_px, taus, strict=True))
+    return max(errors, key=lambda item: item[0])
 
 
 def _format_pair_letters(pair: TriangulatedPair, letters: Mapping[str, str]) -> str:

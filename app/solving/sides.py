@@ -19,6 +19,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import Policy
 from app.solving.ball_3d import is_plausible_position
 from app.solving.ball_covariance import pixel_covariance
+from app.solving.camera_positions import is_main_position
 from app.solving.triangulate import BallObservation, PairPoint, triangulate_observation_pairs
 
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0])
@@ -66,12 +67,16 @@ def find_swapped_views(
     pitch: Pitch,
     policy: Policy,
     doubtful: Sequence[BallObservation] = (),
+    *,
+    is_static: bool = False,
 ) -> tuple[SwappedView, ...]:
     """Views whose ball meets that of the others only after a half turn.
 
     The main camera is believed; it stands on the near side by definition, so where it does not
     (y < 0) it is the one to turn. That others agree with it then says only that they are
-    labelled from the same wrong end. A given camera rests on no labels and is never turned.
+    labelled from the same wrong end, if main cameras stand where it comes to stand. The first of
+    static cameras is no main camera, and stands anywhere. A given camera rests on no labels and is
+    never turned.
 
     Args:
         first: Of the main camera, or None.
@@ -80,11 +85,11 @@ def find_swapped_views(
         policy: Holds tau.
         doubtful: Views whose lines fit too badly to be used: they take no part in what is said of
             others, but that they are labelled from the other end the others can still tell.
+        is_static: Whether the first is a static camera.
     """
-    if first is not None and first.camera.position[1] < 0 and _is_calibrated_from_lines(first):
-        others = _exclude_observation(first, usable)
-        swap = _test_half_turn(first, others, first, pitch, policy) if first in usable else None
-        return (swap or SwappedView(first.view, None, None, confidence=0.9),)
+    swap = None if first is None or is_static else _test_main_camera(first, usable, pitch, policy)
+    if swap is not None:
+        return (swap,)
     swaps = (
         _test_half_turn(replay, others, first, pitch, policy)
         for replay in (*usable, *doubtful)
@@ -92,6 +97,22 @@ def find_swapped_views(
         if (others := _exclude_observation(replay, usable))
     )
     return tuple(swap for swap in swaps if swap is not None)
+
+
+def _test_main_camera(
+    first: BallObservation, usable: Sequence[BallObservation], pitch: Pitch, policy: Policy
+) -> SwappedView | None:
+    """The main camera if it is the one to turn."""
+    if first.camera.position[1] >= 0 or not _is_calibrated_from_lines(first):
+        return None
+    if first in usable:
+        others = _exclude_observation(first, usable)
+        swap = _test_half_turn(first, others, first, pitch, policy)
+        if swap is not None:
+            return swap
+    if not is_main_position(turn_camera(first.camera).position):
+        return None
+    return SwappedView(first.view, None, None, confidence=0.9)
 
 
 def _is_calibrated_from_lines(observation: BallObservation) -> bool:

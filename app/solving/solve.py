@@ -48,7 +48,12 @@ from app.solving.findings import (
     make_misses_ball_finding,
     make_view_disagrees_finding,
 )
-from app.solving.gate_sentences import JudgedView, describe_gates, make_reprojection_gate
+from app.solving.gate_sentences import (
+    JudgedView,
+    describe_gates,
+    find_larger_error_in_tau,
+    make_reprojection_gate,
+)
 from app.solving.judgement import (
     PASSES,
     Judgement,
@@ -291,9 +296,10 @@ def _rethreshold_finding(
         view = solution.view(found.view)
         if view is not None and view.included:
             return make_misses_ball_finding(found.view, found.number, tau_px[found.view])
-        own = find_closest_pair([pair for pair in judged if found.view in (pair.a, pair.b)])
-        return make_view_disagrees_finding(found.view, own, letters, tau_px[found.view])
+        of_view = [pair for pair in judged if found.view in (pair.a, pair.b)]
+        own = find_closest_pair(of_view, tau_px)
+        return make_view_disagrees_finding(found.view, own, letters, tau_px)
     if found.kind == "not_synchronous":
-        best = find_closest_pair(judged)
-        return replace(found, threshold=max(tau_px[best.a], tau_px[best.b]))
+        best = find_closest_pair(judged, tau_px)
+        return replace(found, threshold=find_larger_error_in_tau(best, tau_px)[2])
     return found

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from app.soccer.annotation import BallAnnotation
 from app.soccer.finding import Finding, SuggestedFix
-from app.soccer.frames import Box
+from app.soccer.frames import Box, ImageSize
+from app.soccer.group import Station
 from app.soccer.policy import PAPER
 from app.soccer.solution import (
     Ball3D,
@@ -21,8 +22,9 @@ from app.soccer.solution import (
 from app.solving.contradiction import Contradiction
 from app.solving.findings import _BY_WEIGHT, _make_sides_swapped_finding, find_group_findings
 from app.solving.sides import SwappedView
-from tests.cameras import SIZE
-from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, given_view, group
+from app.solving.solve import solve_group
+from tests.cameras import SIZE, looking
+from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, click, given_view, group
 
 BALL = (38.0, 2.0, -1.4)
 CAMERAS = {"a": MAIN, "b": BEHIND_GOAL, "c": OPPOSITE}
@@ -57,6 +59,13 @@ def found(of, *, pairs=(), ball=GOOD, views=None, policy=PAPER, torn=None) -> tu
 class TestFind:
     def test_a_group_in_good_order_has_none(self) -> None:
         assert found(made("abc"), pairs=(pair("a", "b", 1.0, 2.0),)) == ()
+
+    def test_of_a_view_that_a_person_left_out_nothing_is_said(self) -> None:
+        of = made("abc")
+        ball = of.views[2].balls[0]
+        spoilt = replace(of.views[2], balls=(ball, ball))
+        assert [item.view for item in found(of.with_view(spoilt))] == ["c"]
+        assert found(of.with_view(replace(spoilt, included=False))) == ()
 
     def test_a_group_without_views_has_none(self) -> None:
         assert find_group_findings(group(), (), (), (), None, PAPER) == ()
@@ -132,6 +141,59 @@ class TestViewDisagrees:
             *(None, None),
         )
         assert "behind a camera" in item.sentence and " px" not in item.sentence
+
+
+class TestViewsOfSeveralSizes:
+    """A view of a large picture beside one whose tau is a third of it."""
+
+    LARGE = ImageSize(3 * SIZE.width, 3 * SIZE.height)
+
+    def made(self, keys: str):
+        of = made(keys)
+        station = replace(of.views[0].station, size=self.LARGE)
+        return of.with_view(replace(of.views[0], station=station))
+
+    def told(self, keys: str, **what) -> list[Finding]:
+        """What is said of errors; the large view's camera is that of a small picture."""
+        kinds = "not_synchronous", "view_disagrees"
+        return [item for item in found(self.made(keys), **what) if item.kind in kinds]
+
+    def test_each_error_is_compared_with_the_tau_of_its_view(self) -> None:
+        apart = pair("a", "b", 5.0, TAU + 1, failed="reprojection")
+        (item,) = self.told("ab", pairs=(apart,), ball=None)
+        assert item.sentence.startswith("The two views do not see the ball in the same place")
+        assert (item.number, item.threshold) == (TAU + 1, pytest.approx(TAU))
+
+    def test_only_what_all_allow_lies_behind_a_camera(self) -> None:
+        behind = pair("a", "b", 3 * TAU - 1, TAU - 1, failed="reprojection")
+        (item,) = self.told("ab", pairs=(behind,), ball=None)
+        assert item.sentence.startswith("The rays of no two views meet in front of their cameras.")
+        assert (item.number, item.threshold) == (None, None)
+
+    def test_the_closest_pair_is_that_in_units_of_tau(self) -> None:
+        small = pair("b", "c", 2 * TAU, 2 * TAU, failed="reprojection")
+        large = pair("a", "b", 4.5 * TAU, 1.0, failed="reprojection")
+        (item,) = self.told("abc", pairs=(small, large), ball=None)
+        assert (item.number, item.threshold) == (4.5 * TAU, pytest.approx(3 * TAU))
+
+    def test_a_view_that_disagrees_is_told_both_limits(self) -> None:
+        pairs = (
+            pair("a", "c", 1.0, 1.0),
+            pair("a", "b", 2.0, TAU + 1, failed="reprojection"),
+            pair("b", "c", 5 * TAU, 5 * TAU, failed="reprojection"),
+        )
+        views = [solved("a"), solved("b", included=False), solved("c")]
+        (item,) = self.told("abc", pairs=pairs, views=views)
+        assert (item.kind, item.view) == ("view_disagrees", "b")
+        assert (item.number, item.threshold) == (TAU + 1, pytest.approx(TAU))
+        assert f"at most {TAU:.1f} px and {3 * TAU:.1f} px are allowed" in item.sentence
+
+    def test_of_views_that_disagree_the_one_that_is_farther_off_in_units_of_tau_is_first(
+        self,
+    ) -> None:
+        views = [off("a", 4 * TAU), off("b", 2 * TAU)]
+        kinds = [item.view for item in self.told("ab", views=views)]
+        assert kinds == ["b", "a"]
 
 
 class TestMissesBall:
@@ -290,6 +352,19 @@ class TestOfTheBall:
 
 
 class TestSidesSwapped:
+    def test_the_first_of_static_cameras_is_no_main_camera(self) -> None:
+        """Its station says that it is one; who stands where is tested with ``find_swapped_views``."""
+        far = looking((10.0, -60.0, -12.0), (38.0, 2.0, 0.0), 2000.0)
+        for shared, kinds in ((False, ["sides_swapped"]), (True, [])):
+            of = group(*(given_view(key, at, BALL) for key, at in (("a", far), ("b", BEHIND_GOAL))))
+            for view in of.views:
+                lines = click(view.station.given)
+                station = Station(view.key, SIZE, shared=shared, lines=lines)
+                of = of.with_view(replace(view, station=station))
+            findings = solve_group(of, PAPER).findings
+            swapped = [item.kind for item in findings if item.kind == "sides_swapped"]
+            assert swapped == kinds
+
     def test_without_an_error_as_labelled_there_is_no_number(self) -> None:
         finding = _make_sides_swapped_finding(SwappedView("7_1.png", None, 2.0, 1.0))
         assert (finding.number, finding.threshold, finding.confidence) == (None, 2.0, 1.0)

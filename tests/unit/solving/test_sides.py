@@ -13,7 +13,7 @@ from app.soccer.policy import PAPER
 from app.soccer.solution import Calibration
 from app.solving.sides import SwappedView, find_swapped_views, turn_camera
 from app.solving.triangulate import BallObservation
-from tests.cameras import SIZE
+from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE, PITCH
 
 BALL = (38.0, 2.0, -1.4)
@@ -30,6 +30,7 @@ def sight(
 
 A, B, C = sight("a", MAIN), sight("b", BEHIND_GOAL), sight("c", OPPOSITE)
 TURNED = sight("b", BEHIND_GOAL, labelled=turn_camera(BEHIND_GOAL))
+TURNED_C = sight("c", OPPOSITE, labelled=turn_camera(OPPOSITE))
 
 
 def swaps(
@@ -103,6 +104,19 @@ class TestFindSwaps:
         others = (wrong, TURNED)
         found = swaps(*(others[place] for place in usable), first=wrong)
         assert found == (SwappedView("a", None, None, 0.9),)
+
+    def test_a_first_view_that_no_main_camera_stands_opposite_is_left_alone(self):
+        goal = sight("a", looking((-75.0, -3.0, -8.0), (38.0, 2.0, 0.0), 1300.0))
+        assert swaps(goal, B, C, first=goal) == ()
+        # What is turned besides is found all the same.
+        assert [swap.view for swap in swaps(goal, B, TURNED_C, first=goal)] == ["c"]
+
+    def test_the_first_of_static_cameras_may_stand_on_the_far_side(self):
+        far = sight("a", looking((10.0, -60.0, -12.0), (38.0, 2.0, 0.0), 2000.0))
+        assert [swap.view for swap in swaps(far, B, first=far)] == ["a"]
+        assert find_swapped_views(far, (far, B), PITCH, PAPER, is_static=True) == ()
+        named = find_swapped_views(far, (far, TURNED), PITCH, PAPER, is_static=True)
+        assert [swap.view for swap in named] == ["b"]
 
     def test_a_given_main_camera_may_stand_where_it_likes(self):
         far = sight("a", turn_camera(MAIN), source="given")
