@@ -113,6 +113,7 @@ def make_next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGrou
             group.positions,
             codec.paint_digests_to_json(group.paint),
             group.noise_factors_by_view,
+            group.match,
         ),
         group=group,
         stations=stations,
@@ -237,6 +238,7 @@ def refresh_inputs_hashes(session: Session, group_ids: Sequence[int]) -> None:
     statement = (
         select(
             GroupModel.id,
+            GroupModel.match,
             GroupModel.pitch_length,
             GroupModel.pitch_width,
             GroupModel.positions,
@@ -264,7 +266,8 @@ def refresh_inputs_hashes(session: Session, group_ids: Sequence[int]) -> None:
         positions = camera_positions_from_text(row.positions)
         pitch = Pitch(row.pitch_length, row.pitch_width)
         paint = read_paint_digests(row.paint)
-        digest = hash_solver_inputs(pitch, pairs[key], positions, paint, noise.get(key, {}))
+        own = noise.get(key, {})
+        digest = hash_solver_inputs(pitch, pairs[key], positions, paint, own, row.match)
         rows.append({"of": key, "inputs_hash": digest})
     if rows:
         session.execute(update(GroupModel).where(GroupModel.id == bindparam("of")), rows)

@@ -341,6 +341,17 @@ class TestAChangedSource:
         assert [load_group_state(store, number).solution for number in ids] == [None, None]
         assert load_group_state(store, ids[1]).group.views[0].station.lines == moved.lines
 
+    def test_a_match_that_is_named_makes_a_group_of_one_view_stale(
+        self, store, fill, make_group
+    ) -> None:
+        whole = make_group(9)
+        one = replace(whole, views=whole.views[:1], match="")
+        (number,) = fill(one)
+        assert load_group_state(store, number).solution is not None
+        again(store, replace(one, match="m"))
+        state = load_group_state(store, number)
+        assert (state.group.match, state.solution) == ("m", None)
+
     def test_a_static_camera_that_changed_counts_as_changed_once(
         self, store, fill, make_static, monkeypatch
     ) -> None:
