@@ -17,7 +17,7 @@ from app.soccer.solution import Ball3D, BestBall, Calibration, Solution
 from app.solving.ball_noise import RayResidual
 from app.solving.dataset_noise import DatasetNoise, GroupNoiseInputs, estimate_noise
 from app.solving.solve import solve_group
-from tests.bench.cases import Case, Made, make_case
+from tests.bench.cases import SIZE, Case, Made, make_case
 from tests.bench.pitches import estimate_match
 from tests.bench.table import print_table
 
@@ -224,7 +224,7 @@ def _position_holds(found: Calibration, position: FloatArray) -> bool | None:
 
 
 def _focal_holds(found: Calibration, focal: float) -> bool | None:
-    sigma = camera_sigma(found)
+    sigma = camera_sigma(found, SIZE)
     if sigma is None or found.camera is None:
         return None
     return bool(abs(found.camera.focal_length[1] - focal) < FOCAL_SIGMAS * sigma.focal_px)

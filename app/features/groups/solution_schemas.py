@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -12,14 +11,10 @@ import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from app.features.groups.edit_codec import edit_to_json
-from app.features.groups.suggested_edits import (
-    find_guide_of_finding,
-    list_edits_of_finding,
-)
-from app.formats.camera_json import camera_to_json
+from app.features.groups.suggested_edits import find_guide_of_finding, list_edits_of_finding
+from app.formats.camera_json import camera_to_json, covariance_to_json
 from app.geometry.camera import Camera
 from app.geometry.lens import BROWN_CONRADY
-from app.geometry.resection import KAPPA, LOG_FOCAL, PAN, PARAMETERS, ROLL, TILT, X, Y, Z
 from app.http.documents import Document, IdentityCache
 from app.soccer.finding import Dismissal, Finding, SuggestedFix
 from app.soccer.frames import Box, ImageSize
@@ -55,12 +50,12 @@ class CameraSigma:
     k1: float
 
 
-def camera_sigma(calibration: Calibration) -> CameraSigma | None:
-    """The standard deviations of a camera that was found from lines.
+def camera_sigma(calibration: Calibration, size: ImageSize) -> CameraSigma | None:
+    """The standard deviations of a camera whose covariance is known, those that its file says.
 
-    The covariance is that of the solver's parameters (``geometry.resection``). The focal length is
-    the exponential of one of them, and k1 = kappa (f / half_diagonal)^2 depends on two, which go
-    together: both follow to first order.
+    Args:
+        calibration: Of a view.
+        size: Annotated size.
 
     Returns:
         None for a given camera of which nothing more is known, and where the lines leave a combination open.
@@ -71,22 +66,9 @@ def camera_sigma(calibration: Calibration) -> CameraSigma | None:
     camera, covariance = calibration.camera, calibration.known_covariance_with_pitch
     if camera is None or covariance is None:
         return None
-    spread = np.array(covariance).reshape(PARAMETERS, PARAMETERS)
-    sigma = np.sqrt(np.maximum(np.diag(spread), 0.0))
-    focal = camera.focal_length[0]
-    # Calibration from lines puts the principal point in the middle of the image.
-    half_diagonal = math.hypot(camera.principal_point[0] + 0.5, camera.principal_point[1] + 0.5)
-    slopes = np.zeros(PARAMETERS)
-    slopes[LOG_FOCAL] = 2.0 * camera.distortion[0]
-    slopes[KAPPA] = (focal / half_diagonal) ** 2
-    return CameraSigma(
-        pan_degrees=math.degrees(sigma[PAN]),
-        tilt_degrees=math.degrees(sigma[TILT]),
-        roll_degrees=math.degrees(sigma[ROLL]),
-        position_meters=(float(sigma[X]), float(sigma[Y]), float(sigma[Z])),
-        focal_px=float(focal * sigma[LOG_FOCAL]),
-        k1=math.sqrt(max(0.0, float(slopes @ spread @ slopes))),
-    )
+    variances = np.diag(covariance_to_json(covariance, camera, size))
+    x, y, z, pan, tilt, roll, focal, k1 = np.sqrt(np.maximum(variances, 0.0)).tolist()
+    return CameraSigma(pan, tilt, roll, (x, y, z), focal, k1)
 
 
 def _box_to_numbers(box: Any) -> Any:
@@ -230,7 +212,7 @@ def _make_calibration_document(
             **vars(calibration),
             "camera": camera
             and camera_to_json(camera, calibration.known_covariance_with_pitch, size),
-            "sigma": camera_sigma(calibration),
+            "sigma": camera_sigma(calibration, size),
             "markings": markings,
         }
     )

@@ -104,7 +104,7 @@ class TestCamera:
             found.known_covariance_with_pitch, found.covariance
         ))  # fmt: skip
         assert 0.5 < np.linalg.norm(told) < 2 and np.linalg.norm(own) < 0.3
-        assert camera_sigma(found).position_meters == pytest.approx(tuple(told))
+        assert camera_sigma(found, SIZE).position_meters == pytest.approx(tuple(told))
 
     def test_paint_of_a_pitch_by_the_laws_is_fitted_where_the_policy_says_so(self):
         pitch, apart = Pitch(goal="laws"), {}

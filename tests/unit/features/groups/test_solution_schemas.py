@@ -10,17 +10,21 @@ import numpy as np
 import pytest
 
 from app.features.groups.edit_codec import edit_from_json
-from app.features.groups.solution_schemas import SolutionDocument, camera_sigma
+from app.features.groups.solution_schemas import (
+    SolutionDocument,
+    _make_calibration_document,
+    camera_sigma,
+)
 from app.geometry.polyline import distance_to_polyline
 from app.geometry.resection import PARAMETERS, camera_from_parameters, parameters_from_camera
 from app.soccer.finding import Finding, SuggestedFix
 from app.soccer.group import Group
-from app.soccer.pitch import GOAL_PARTS
+from app.soccer.pitch import GOAL_PARTS, Pitch
 from app.soccer.policy import PAPER, STRICT
 from app.soccer.solution import Calibration, Solution
 from app.solving.jaccard import project_markings
 from app.solving.solve import solve_group
-from tests.cameras import WIDE_LENSES, wide
+from tests.cameras import SIZE, WIDE_LENSES, wide
 from tests.unit.stores import MAIN
 
 
@@ -185,7 +189,7 @@ def calibration(covariance: np.ndarray | None) -> Calibration:
 
 class TestCameraSigma:
     def test_numbers_by_hand(self) -> None:
-        sigma = camera_sigma(calibration(np.diag(SIGMAS**2)))
+        sigma = camera_sigma(calibration(np.diag(SIGMAS**2)), SIZE)
         assert sigma is not None
         assert sigma.pan_degrees == pytest.approx(0.0572957795)
         assert sigma.roll_degrees == pytest.approx(3 * sigma.pan_degrees)
@@ -203,13 +207,29 @@ class TestCameraSigma:
             camera_from_parameters(row, known.camera.principal_point, HALF_DIAGONAL)
             for row in rng.multivariate_normal(mean, spread, size=4000)
         ]
-        sigma = camera_sigma(known)
+        sigma = camera_sigma(known, SIZE)
         assert sigma is not None
         # A sigma of 4000 draws is itself known to 1 / sqrt(2 * 4000), about 1.1 %.
         assert sigma.k1 == pytest.approx(np.std([one.distortion[0] for one in drawn]), rel=0.06)
         focals = [one.focal_length[0] for one in drawn]
         assert sigma.focal_px == pytest.approx(np.std(focals), rel=0.06)
 
+    def test_are_those_of_the_cameras_file_also_beside_the_middle_and_with_other_pixels(
+        self,
+    ) -> None:
+        known = calibration(np.diag(SIGMAS**2))
+        assert known.camera is not None
+        aside = replace(known.camera, principal_point=(500.0, 200.0), focal_length=(1500.0, 1200.0))
+        known = replace(known, camera=aside)
+        document = _make_calibration_document(known, Pitch(), SIZE)
+        assert document.camera is not None and document.camera.covariance is not None
+        told = np.sqrt(np.diag(document.camera.covariance))
+        sigma = document.sigma
+        assert sigma is not None
+        assert (sigma.focal_px, sigma.k1) == pytest.approx(tuple(told[6:]))
+        slope = (2 * np.sqrt(1500.0 * 1200.0) / SIZE.diagonal) ** 2
+        assert sigma.k1 == pytest.approx(np.hypot(2 * 0.12 * SIGMAS[6], slope * SIGMAS[7]))
+
     def test_a_given_camera_and_a_view_without_camera_have_no_sigma(self) -> None:
-        assert camera_sigma(calibration(None)) is None
-        assert camera_sigma(Calibration(source="lines", camera=None)) is None
+        assert camera_sigma(calibration(None), SIZE) is None
+        assert camera_sigma(Calibration(source="lines", camera=None), SIZE) is None
