@@ -14,7 +14,7 @@ import { ApiError } from './problem.js';
  * @property {LinesJson} lines
  * @property {'given' | 'lines'} calibration
  * @property {boolean} has_given
- * @property {boolean} has_given_covariance an accepted rig says how far it may be off
+ * @property {boolean} has_given_covariance an accepted rig, or the data, says how far it may be off
  * @property {boolean} can_undo
  * @property {boolean} can_redo
  * @property {string} etag

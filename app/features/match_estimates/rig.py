@@ -37,6 +37,7 @@ from app.soccer.solution import SOLVER_VERSION
 from app.solving.calibrate import calibrate_station
 from app.solving.rig import RigCamera, RigFrame
 from app.solving.rig_proposal import PROPOSAL_VERSION, RigProposal, propose_rig
+from app.wording import plural
 
 CAMERAS, SIGMA = "cameras", "sigma"
 """What can be accepted: the adjusted cameras; or how far those in use may be off, alone."""
@@ -76,7 +77,8 @@ def propose_adjustment(
         executor: Where it is computed; None: here.
 
     Raises:
-        InputError: Too few cameras share balls, or their pitches differ.
+        InputError: Too few cameras share balls, their pitches differ, or cameras were given with a
+            covariance.
         ConflictError: The cameras were adjusted already.
     """
     states, pitch, policy = load_adjustable_cameras(store, dataset)
@@ -118,7 +120,8 @@ def load_adjustable_cameras(
     """The static cameras of a dataset, their pitch, and the dataset's policy.
 
     Raises:
-        InputError: There are fewer than two, or their pitches differ.
+        InputError: There are fewer than two, their pitches differ, or some were given with a
+            covariance.
         ConflictError: They were adjusted already.
     """
     with store.read() as session:
@@ -131,10 +134,23 @@ def load_adjustable_cameras(
             f"{found.name} has {len(states)} static cameras; adjusting a rig needs at least two",
             hint="Only cameras that stand still can be adjusted to each other.",
         )
-    if any(state.station.given_covariance is not None for state in states):
+    known = [state for state in states if state.station.given_covariance is not None]
+    with store.read() as session:
+        steps = [
+            _find_adjustment(session, state, read_station_stacks(session, state.id).done)
+            for state in known
+        ]
+    if any(step is not None for step in steps):
         raise ConflictError(
             f"the cameras of {found.name} were adjusted already",
             hint="Undo that adjustment first, otherwise the same balls would be used twice.",
+        )
+    if known:
+        raise InputError(
+            f"{plural(len(known), 'static camera')} of {found.name} {'was' if len(known) == 1 else 'were'} "
+            f"given with a covariance: {', '.join(state.station.key for state in known)}",
+            hint="It says how far off they may be. To adjust them to balls and lines instead, "
+            "import them without it.",
         )
     if len(pitches) != 1:
         raise InputError(

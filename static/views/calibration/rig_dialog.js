@@ -66,7 +66,7 @@ export function RigDialog({ dataset, station, onClose }) {
 	const [problem, setProblem] = useState(/** @type {{text: string, adjusted: boolean} | null} */ (null));
 	const read = useCallback((/** @type {AbortSignal} */ signal) => getStation(station, signal), [station]);
 	const present = useResource(read, [station]);
-	const adjusted = problem?.adjusted || present.value?.has_given_covariance;
+	const adjusted = problem?.adjusted || (present.value?.has_given_covariance && present.value.can_undo);
 	const busy = job !== null && !isOver(job);
 	/** @param {() => Promise<void>} act */
 	async function attempt(act) {

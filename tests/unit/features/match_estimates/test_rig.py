@@ -195,6 +195,30 @@ class TestAccept:
         with pytest.raises(ConflictError, match="adjusted already"):
             propose_adjustment(store, "demo")
 
+    def test_cameras_that_came_with_a_covariance_were_not_adjusted(self, store, fill) -> None:
+        known = tuple((1e-6 * np.eye(8)).ravel().tolist())
+        attached = {
+            view.station.key: replace(view.station, given_covariance=known)
+            for group in groups()
+            for view in group.views
+            if view.key in ("cam1", "cam2")
+        }
+        came = [
+            replace(
+                group,
+                views=tuple(
+                    replace(view, station=attached.get(view.key, view.station))
+                    for view in group.views
+                ),
+            )
+            for group in groups()
+        ]
+        fill(*came, solved=False)
+        with pytest.raises(
+            InputError, match=r"2 static cameras .* given with a covariance: cam1, cam2"
+        ):
+            require_adjustable_cameras(store, "demo")
+
     def test_what_can_be_accepted_is_the_cameras_or_sigma_and_nothing_else(
         self, store, proposed
     ) -> None:
