@@ -361,15 +361,15 @@ def calibrate_view(
         known: Calibrations by key; that of the clicks is not computed again where it is there.
     """
     key = compute_click_calibration_key(group, view, policy)
-    clicked = known.get(key) or calibrate_from_clicks(group, view, policy)
+    found = known.get(key) or calibrate_from_clicks(group, view, policy)
     reading = find_wanted_paint_reading(group, view, policy)
-    if reading is None or reading.sought_for != compute_paint_search_key(group, view, policy):
-        if not is_lone_frame(group, view, policy):
-            return clicked
-        station = view.station
-        alone = analyse_lone_frame(clicked, station.lines, group.pitch, station.size, policy)
-        return add_lone_frame_covariance(clicked, alone)
-    return calibrate_from_paint(clicked, reading, view.station, group.pitch, policy)
+    if reading is not None and reading.sought_for == compute_paint_search_key(group, view, policy):
+        found = calibrate_from_paint(found, reading, view.station, group.pitch, policy)
+    if found.source == "paint" or not is_lone_frame(group, view, policy):
+        return found
+    station = view.station
+    alone = analyse_lone_frame(found, station.lines, group.pitch, station.size, policy)
+    return add_lone_frame_covariance(found, alone)
 
 
 def calibrate_from_clicks(group: Group, view: View, policy: CalibrationPolicy) -> Calibration:
@@ -390,12 +390,12 @@ def compute_view_calibration_keys(
     """The same, and after it the key of the clicks that it starts from where it is another."""
     key = compute_click_calibration_key(group, view, policy)
     reading = find_wanted_paint_reading(group, view, policy)
-    if reading is None or reading.sought_for != compute_paint_search_key(group, view, policy):
-        if not is_lone_frame(group, view, policy):
-            return (key,)
-        return digest_content(f"{key} lone {policy.lone_frames}".encode()), key
-    painted = digest_content(f"{key} {reading.digest}".encode())
-    return painted, key
+    parts = [key]
+    if reading is not None and reading.sought_for == compute_paint_search_key(group, view, policy):
+        parts.append(reading.digest)
+    if is_lone_frame(group, view, policy):
+        parts.append(f"lone {policy.lone_frames}")
+    return (key,) if len(parts) == 1 else (digest_content(" ".join(parts).encode()), key)
 
 
 def compute_click_calibration_key(group: Group, view: View, policy: CalibrationPolicy) -> str:

@@ -12,6 +12,7 @@ from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.soccer.annotation import Lines
 from app.soccer.group import Group, Station, View
+from app.soccer.paint_evidence import PAINT_DISAGREES, PaintEvidence, PaintReading
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, STRICT, TOUCHLINE, CalibrationPolicy
@@ -20,6 +21,7 @@ from app.solving.calibrate import (
     analyse_lone_frame,
     calibrate,
     calibrate_view,
+    compute_paint_search_key,
     compute_view_calibration_keys,
 )
 from app.solving.calibration_findings import find_pitch_findings_of_lone_frame
@@ -139,6 +141,29 @@ class TestOfDataset:
         key, clicks = compute_view_calibration_keys(group, group.views[0], TOUCHLINE.calibration)
         exact = replace(TOUCHLINE.calibration, lone_frames="exact")
         assert compute_view_calibration_keys(group, group.views[0], exact) == (clicks,) != (key,)
+
+    @pytest.mark.parametrize("reason", ["no_paint", "no_frame", PAINT_DISAGREES])
+    def test_is_alone_also_where_its_paint_says_nothing(self, reason: str, monkeypatch) -> None:
+        monkeypatch.setattr("app.solving.calibrate.solve_paint", lambda *_: None)
+        view, policy = self.view("a"), TOUCHLINE.calibration
+
+        def with_reading(match: str) -> Group:
+            group = self.group(view, match=match)
+            sought_for = compute_paint_search_key(group, view, policy)
+            told = None if reason == PAINT_DISAGREES else reason
+            reading = PaintReading("", sought_for, PaintEvidence({}), told)
+            return replace(group, paint={"a": reading})
+
+        found = calibrate_view(with_reading(""), view, policy)
+        unread = calibrate_view(self.group(view), view, policy)
+        assert found.paint is not None
+        assert (found.source, found.paint.reason) == ("lines", reason)
+        assert found == replace(unread, paint=found.paint)
+        assert self.sigma(with_reading("m"), policy) < unread.position_sigma_m / 2
+        keys = [
+            compute_view_calibration_keys(with_reading(name), view, policy) for name in ("", "m")
+        ]
+        assert keys[0][1] == keys[1][1] and keys[0][0] != keys[1][0]
 
     @pytest.mark.parametrize("kind", ["of a match", "two views", "said picture", "other pitch"])
     def test_others_are_as_they_were(self, kind: str) -> None:
