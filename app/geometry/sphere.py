@@ -67,7 +67,7 @@ def optimal_diameter(
         Diameter in pixels, and the distance of the point from the ray in metres.
 
     Raises:
-        DegenerateGeometryError: The point lies behind the camera.
+        DegenerateGeometryError: The point lies behind the camera, or no ray goes through the centre.
 
     Source: closed form of the box optimisation of SoccerNet-v3D (arXiv 2504.10106); through a
         wide lens ``sphere_image_scale``.
@@ -77,11 +77,11 @@ def optimal_diameter(
     ray = camera.rotation.T @ np.append(ideal, 1.0)
     offset = require_shape(point, (3,), "point") - camera.position
     depth = float(ray @ offset / (ray @ ray))
-    if camera.is_wide and not np.isfinite(ideal).all():
+    if not np.isfinite(ideal).all():
         raise DegenerateGeometryError(
             "the centre of the ball lies outside the field of view of the lens"
         )
-    if depth <= 0:
+    if not depth > 0:
         raise DegenerateGeometryError("the point lies behind the camera")
     off_ray = float(np.linalg.norm(offset - depth * ray))
     if camera.is_wide:

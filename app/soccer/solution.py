@@ -13,7 +13,7 @@ from app.soccer.choices import GoalEdge
 from app.soccer.finding import Finding
 from app.soccer.frames import Box, ImagePoint, height_above_grass
 
-SOLVER_VERSION = "10"
+SOLVER_VERSION = "11"
 """Part of every solution's key; raised by one whenever a number changes."""
 
 GAMMAS_PERCENT = (0.5, 1.0, 2.0)
@@ -183,6 +183,12 @@ class Calibration:
         if known is None or not all(map(math.isfinite, known)):
             return None
         return tuple(map(sum, zip(known, self.pitch_covariance or [0.0] * 64, strict=True)))
+
+    @property
+    def is_left_open(self) -> bool:
+        """Whether its lines leave the camera open: they have no covariance that says how exact it is."""
+        found = self.camera is not None and self.source != "given"
+        return found and not self.has_known_covariance
 
     @property
     def is_given_without_uncertainty(self) -> bool:

@@ -200,7 +200,8 @@ def find_best_ball(
 ) -> BestBall | None:
     """The point that explains the most views best; None where no two views see the ball.
 
-    All views count, weighted by the uncertainty of click and calibration. Where they contradict
+    All views count, weighted by the uncertainty of click and calibration, but for those whose lines
+    leave their camera open. Where they contradict
     each other the largest set of views that does not is taken, so that one bad view does no
     harm; where those that stay contradict each other, as two views may, its covariance is widened.
 
@@ -211,10 +212,13 @@ def find_best_ball(
 
     Source: Hartley & Zisserman, sec. 12.5 (minimum reprojection error), with covariances.
     """
+    usable = [item for item in usable if not item.calibration.is_left_open]
+    names = {item.view for item in usable}
     starts = {
         frozenset((pair.a, pair.b)): np.array(pair.point)
         for pair in pairs
-        if pair.failed in (None, "reprojection") and not _is_behind_a_camera(pair, usable)
+        if pair.failed in (None, "reprojection") and {pair.a, pair.b} <= names
+        if not _is_behind_a_camera(pair, usable)
     }
     if not starts:
         return None

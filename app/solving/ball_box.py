@@ -70,6 +70,9 @@ def predict_ball_in_view(
 ) -> ExpectedBall | None:
     """Where a view should show the 3D ball; None where it has no camera or the ball is behind it.
 
+    The covariance of the place is infinite where that of the ball is, and where the lines of the
+    view leave its camera open.
+
     Args:
         calibration: The view's calibration.
         size: Annotated size.
@@ -82,9 +85,12 @@ def predict_ball_in_view(
     x, y = calibration.camera.project(point[None])[0].tolist()
     if not np.isfinite((x, y)).all():
         return None
-    jacobian = calibration.camera.jacobian(point)
-    covariance = jacobian @ np.array(ball.covariance).reshape(3, 3) @ jacobian.T
-    covariance = covariance + calibration_pixel_covariance(calibration, size, point)
+    jacobian, known = calibration.camera.jacobian(point), np.reshape(ball.covariance, (3, 3))
+    if calibration.is_left_open or not np.isfinite(known).all():
+        covariance = np.full((2, 2), np.inf)
+    else:
+        covariance = jacobian @ known @ jacobian.T
+        covariance = covariance + calibration_pixel_covariance(calibration, size, point)
     if calibration.is_given_without_uncertainty:
         covariance = covariance + given_camera_sigma_px(size.diagonal, policy) ** 2 * np.eye(2)
     return ExpectedBall(

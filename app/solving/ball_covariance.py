@@ -318,6 +318,8 @@ class CovarianceOfMeanBall:
     ) -> FloatArray:
         """Covariance of the mean of the valid pairs of each group, square metres, shape (N, 3, 3).
 
+        Infinite where the lines of one of their views leave its camera open.
+
         Args:
             valid: Pairs that count, shape (P,).
             groups: Rows of groups that have any, increasing, shape (N,).
@@ -335,7 +337,9 @@ class CovarianceOfMeanBall:
             parts = (slopes.transpose(0, 2, 1) @ pixels @ slopes).reshape(-1, 9)
         owner = np.searchsorted(groups, facts.view_group[views])
         total = [np.bincount(owner, part, minlength=len(groups)) for part in parts.T]
-        return np.array(total, float).T.reshape(-1, 3, 3)
+        found = np.array(total, float).T.reshape(-1, 3, 3)
+        found[owner[facts.view_open[views]]] = np.inf
+        return found
 
     def _update_slopes(self, valid: BoolArray, groups: IntArray, points: FloatArray) -> None:
         """Compute slopes and carried covariances anew where the valid pairs are others."""

@@ -133,7 +133,8 @@ def compute_ray_residuals(
     """What the rays to the ball of one group leave unexplained: 2 V - 3 numbers of V views.
 
     Given cameras with a covariance are left aside: those of one rig err together, and a
-    covariance of each alone would explain away what the clicks are off.
+    covariance of each alone would explain away what the clicks are off. So are cameras that their
+    lines leave open: nobody knows how much of a miss is theirs.
 
     Args:
         ball: Where the group's valid pairs put it.
@@ -144,6 +145,7 @@ def compute_ray_residuals(
         for observation in observations
         if observation.view in ball.views
         and (observation.calibration.source != "given" or observation.is_given_without_uncertainty)
+        and not observation.calibration.is_left_open
     ]
     if len(seen) < 2:
         return ()

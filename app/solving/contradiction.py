@@ -100,7 +100,8 @@ def find_contradiction(
     observations: Sequence[BallObservation],
     policy: Policy,
 ) -> Contradiction | None:
-    """Where the views of the ball contradict each other; None where they do not.
+    """Where the views of the ball contradict each other; None where they do not, and where the
+    lines of one leave its camera open, for its residuals are of no known size.
 
     Where nobody says how far a given camera is off, that is one more thing that may be wrong.
 
@@ -115,6 +116,8 @@ def find_contradiction(
     if chi_square is None or chi_square.p_value >= LOW_P_VALUE:
         return None
     used = np.array([key in chi_square.views for key in keys])
+    if facts.view_open[used].any():
+        return None
     known = not find_untestable_groups(facts, used, policy)[0]
     chosen = [observation for observation in observations if observation.view in chi_square.views]
     if len(chosen) == 2:

@@ -27,9 +27,11 @@ from app.soccer.picture import camera_aspect
 from app.soccer.solution import Calibration
 from app.solving.triangulate import (
     WHOLE,
+    BallObservation,
     PairPoint,
     UncertainCameraParameters,
     collect_ball_observations,
+    find_views_without_ray,
     stack_pair_arrays,
     triangulate_observation_pairs,
 )
@@ -49,7 +51,7 @@ class GroupFacts:
         view_camera: It has a camera.
         view_given: Its camera came with the data.
         view_measured: Its JaC can be measured.
-        view_ball: It shows the one ball.
+        view_ball: It shows the one ball, and a ray goes through it as far as its camera says.
         view_diagonal: Pixels.
         view_position: Of the camera, pitch frame, metres, NaN without one, shape (V, 3).
         view_parameters: Of the camera, shape (V, 8).
@@ -119,6 +121,12 @@ class GroupFacts:
         """Its camera came with the data and nobody says how exact it is, shape (V,)."""
         bare: BoolArray = self.view_given & ~self.view_known
         return bare
+
+    @cached_property
+    def view_open(self) -> BoolArray:
+        """Its lines leave its camera open, so that nothing says how exact it is, shape (V,)."""
+        left_open: BoolArray = self.view_camera & ~self.view_given & ~self.view_known
+        return left_open
 
     @cached_property
     def view_changed(self) -> BoolArray:
@@ -244,20 +252,23 @@ def collect_facts_of_views(
     views: Sequence[View], calibrations: Sequence[Calibration]
 ) -> GroupFacts:
     """The facts of one group, from what was said of its views and the calibration of each."""
-    pair_points = triangulate_observation_pairs(
-        combinations(collect_ball_observations(views, calibrations), 2)
-    )
-    return collect_facts(views, calibrations, pair_points)
+    observations = collect_ball_observations(views, calibrations)
+    pair_points = triangulate_observation_pairs(combinations(observations, 2))
+    return collect_facts(views, calibrations, observations, pair_points)
 
 
 def collect_facts(
-    views: Sequence[View], calibrations: Sequence[Calibration], pair_points: Sequence[PairPoint]
+    views: Sequence[View],
+    calibrations: Sequence[Calibration],
+    observations: Sequence[BallObservation],
+    pair_points: Sequence[PairPoint],
 ) -> GroupFacts:
     """The facts of one group.
 
     Args:
         views: Of the group.
         calibrations: Of each view.
+        observations: Of its balls.
         pair_points: Of every two of its observations.
     """
     marks = [
@@ -278,6 +289,7 @@ def collect_facts(
             parameters[place], covariances[place] = known.parameters, known.covariance
             pictures[place] = 0.0 if known.picture is None else known.picture
     places = {view.key: place for place, view in enumerate(views)}
+    without_ray = find_views_without_ray(views, calibrations, observations)
     slopes, axes = _collect_view_rays(pair_points, places)
     return GroupFacts(
         groups=1,
@@ -286,7 +298,13 @@ def collect_facts(
         view_camera=np.array([item.camera is not None for item in calibrations], bool),
         view_given=np.array([item.source == "given" for item in calibrations], bool),
         view_measured=np.array([item.jac is not None for item in calibrations], bool),
-        view_ball=np.array([ball is not None for ball in balls], bool),
+        view_ball=np.array(
+            [
+                ball is not None and view.key not in without_ray
+                for view, ball in zip(views, balls, strict=True)
+            ],
+            bool,
+        ),
         view_diagonal=np.array(diagonals, float),
         view_position=_to_table([_camera_position(item) for item in calibrations], 3),
         view_parameters=parameters,

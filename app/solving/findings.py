@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from app.soccer.finding import UNUSABLE_SIGMA_M, Finding, SuggestedFix
@@ -13,7 +14,7 @@ from app.solving.ball_3d import explain_implausible_position
 from app.solving.calibration_findings import find_calibration_findings, find_paint_findings
 from app.solving.chi_square import LOW_P_VALUE
 from app.solving.contradiction import SPEEDS, TYPICAL_SPEED, Contradiction
-from app.solving.gate_sentences import describe_odds, find_larger_error_in_tau
+from app.solving.gate_sentences import describe_odds, describe_open_cameras, find_larger_error_in_tau
 from app.solving.sides import SwappedView, find_swapped_views
 from app.solving.triangulate import BallObservation
 from app.wording import format_degrees, format_metres, format_pixels, plural
@@ -84,7 +85,12 @@ def find_group_findings(
         found.append(_make_contradiction_finding(contradicted, group, ball))
     if ball is not None:
         found.extend(_find_low_parallax(ball, policy))
-        found.extend(_find_high_uncertainty(ball, contradicted))
+        letters = [
+            make_view_letter(place)
+            for place, solved in enumerate(views)
+            if solved.view in ball.views and solved.calibration.is_left_open
+        ]
+        found.extend(_find_high_uncertainty(ball, contradicted, letters))
         found.extend(_find_implausible_ball(ball, group.pitch, policy))
     return tuple(sorted(found, key=_finding_sort_key))
 
@@ -355,18 +361,39 @@ def _has_common_clock(group: Group) -> bool:
 
 def _find_low_parallax(ball: Ball3D, policy: Policy) -> Iterator[Finding]:
     if ball.parallax_degrees < policy.low_parallax_degrees:
+        known = math.isfinite(ball.sigma_m)
+        about = f": about ± {format_metres(ball.sigma_m)}" if known else ""
         yield Finding(
             "low_parallax",
             f"The rays meet at only {format_degrees(ball.parallax_degrees)}, so the distance of the ball is "
-            f"uncertain: about ± {format_metres(ball.sigma_m)}. A view from another direction would help.",
+            f"uncertain{about}. A view from another direction would help.",
             number=ball.parallax_degrees,
             threshold=policy.low_parallax_degrees,
         )
 
 
-def _find_high_uncertainty(ball: Ball3D, contradicted: Contradiction | None) -> Iterator[Finding]:
-    """Above ``UNUSABLE_SIGMA_M`` with that as the threshold: nobody can use such a ball."""
+def _find_high_uncertainty(
+    ball: Ball3D, contradicted: Contradiction | None, left_open: Sequence[str]
+) -> Iterator[Finding]:
+    """Above ``UNUSABLE_SIGMA_M`` with that as the threshold: nobody can use such a ball.
+
+    Args:
+        ball: The 3D ball.
+        contradicted: Whether its views contradict each other.
+        left_open: Letters of its views whose lines leave their camera open.
+    """
     if not ball.sigma_m > HIGH_SIGMA_M:
+        return
+    if not math.isfinite(ball.sigma_m):
+        why = (
+            describe_open_cameras(left_open)
+            if left_open
+            else f"its rays meet at {format_degrees(ball.parallax_degrees)}"
+        )
+        help_ = "Draw lines of other directions there, or leave the view out." if left_open else ""
+        sentence = f"How far off the 3D ball may be is not known: {why}. {help_}".rstrip()
+        # Without a number: infinity is none in JSON.
+        yield Finding("high_uncertainty", sentence, threshold=UNUSABLE_SIGMA_M)
         return
     why = (
         "although the views agree"
@@ -391,6 +418,8 @@ def _describe_sigma(ball: Ball3D) -> str:
     """Words for a place of which nothing is known."""
     if not ball.sigma_m > UNUSABLE_SIGMA_M:
         return ""
+    if not math.isfinite(ball.sigma_m):
+        return ", and nothing says how exactly it is known"
     return (
         f", known only to ± {format_metres(ball.sigma_m)}, with rays that meet at "
         f"{format_degrees(ball.parallax_degrees)}"

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import floor, isnan, log10
+from math import floor, isfinite, isnan, log10
 
 from app.soccer.policy import Policy
 from app.soccer.solution import (
@@ -348,7 +348,26 @@ def _make_sigma_gate(group: _JudgedGroup, ball: Ball3D | None, policy: Policy) -
         return _make_unjudged_gate("sigma", threshold, active=active)
     value, passed = ball.sigma_m, "sigma" not in group.failed
     margin = compute_margin(value, threshold, at_most=True)
-    return Gate("sigma", passed, value, threshold, margin, format_metres(value), active=active)
+    sentence = format_metres(value) if isfinite(value) else "not known"
+    left_open = [
+        item for item in group.views if item.key in ball.views and item.calibration.is_left_open
+    ]
+    if left_open:
+        sentence = describe_open_cameras([item.letter for item in left_open])
+    view = left_open[0].key if left_open and not passed else None
+    return Gate("sigma", passed, value, threshold, margin, sentence, view, active)
+
+
+def describe_open_cameras(letters: Sequence[str]) -> str:
+    """What makes the uncertainty of a ball unknown.
+
+    Example:
+        >>> describe_open_cameras(["B"])
+        'the lines of view B leave its camera open'
+    """
+    if len(letters) == 1:
+        return f"the lines of view {letters[0]} leave its camera open"
+    return f"the lines of views {' and '.join(letters)} leave their cameras open"
 
 
 def _make_chi_square_gate(group: _JudgedGroup, found: ChiSquare | None, policy: Policy) -> Gate:

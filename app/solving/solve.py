@@ -91,7 +91,7 @@ def solve_and_collect_facts(
     found = [known[key] for key in keys]
     observations = collect_ball_observations(group.views, found)
     pair_points = triangulate_observation_pairs(combinations(observations, 2))
-    facts = collect_facts(group.views, found, pair_points)
+    facts = collect_facts(group.views, found, observations, pair_points)
     uncertainty = CovarianceOfMeanBall(facts)
     judgement = judge_groups(facts, policy, uncertainty)
     pairs = judge_pairs(pair_points, judgement)
@@ -109,7 +109,7 @@ def solve_and_collect_facts(
         for view, key, gate in zip(group.views, keys, failed, strict=True)
     )
     judged, left_out = (
-        _make_judged_views(group, views, judgement, policy),
+        _make_judged_views(group, views, facts, judgement, policy),
         _list_excluded_view_letters(group),
     )
     solution = Solution(
@@ -173,11 +173,19 @@ def _explain_missing_ball(view: View) -> str:
     seen = [ball for ball in view.balls if not ball.out_of_view]
     if len(seen) > 1:
         return "several in {}"
-    return "placed in {} (not counted)" if seen and seen[0].inferred else "none in {}"
+    if not seen:
+        return "none in {}"
+    if seen[0].inferred:
+        return "placed in {} (not counted)"
+    return "no ray goes through it: it lies beyond what the lens of view {} shows"
 
 
 def _make_judged_views(
-    group: Group, views: Sequence[ViewSolution], judgement: Judgement, policy: Policy
+    group: Group,
+    views: Sequence[ViewSolution],
+    facts: GroupFacts,
+    judgement: Judgement,
+    policy: Policy,
 ) -> tuple[JudgedView, ...]:
     return tuple(
         JudgedView(
@@ -186,12 +194,12 @@ def _make_judged_views(
             calibration=solved.calibration,
             jac=None if np.isnan(jac) else jac,
             tau_px=policy.tau_px(view.size.diagonal),
-            has_ball=view.ball is not None and not view.ball.inferred,
+            has_ball=has_ball,
             failed=solved.failed,
             no_ball=_explain_missing_ball(view),
         )
-        for index, (view, solved, jac) in enumerate(
-            zip(group.views, views, judgement.jac.tolist(), strict=True)
+        for index, (view, solved, jac, has_ball) in enumerate(
+            zip(group.views, views, judgement.jac.tolist(), facts.view_ball.tolist(), strict=True)
         )
         if view.included
     )

@@ -39,7 +39,8 @@ class UncertainCameraParameters:
 
     @staticmethod
     def of(calibration: Calibration, diagonal: float) -> UncertainCameraParameters | None:
-        """None without a camera, and where nobody says how exact it is.
+        """None without a camera, and where nothing says how exact it is: a given camera without
+        covariance counts as exact, one that ``is_left_open`` makes its ball unknown.
 
         Args:
             calibration: Of a view.
@@ -167,6 +168,22 @@ def collect_ball_observations(
         for observation in collect_clicked_balls(views, calibrations)
         if np.isfinite(observation.ideal_center).all()
     ]
+
+
+def find_views_without_ray(
+    views: Sequence[View],
+    calibrations: Sequence[Calibration],
+    observations: Iterable[BallObservation],
+) -> set[str]:
+    """Keys of the views through whose ball no ray goes: it lies beyond what their lens shows.
+
+    Args:
+        views: Of a group.
+        calibrations: Of each view.
+        observations: ``collect_ball_observations`` of them.
+    """
+    clicked = {item.view for item in collect_clicked_balls(views, calibrations)}
+    return clicked - {item.view for item in observations}
 
 
 def collect_clicked_balls(

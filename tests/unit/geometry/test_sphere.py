@@ -64,6 +64,11 @@ class TestOptimalDiameter:
         with pytest.raises(DegenerateGeometryError, match="behind"):
             optimal_diameter(camera(), np.array([640.0, 360.0]), np.array([0.0, 90.0, 0.0]), BALL)
 
+    def test_no_ray_goes_through_what_lies_beyond_the_fold_of_a_lens(self):
+        folded = replace(camera(), distortion=np.array([-0.35, *[0.0] * 11]))
+        with pytest.raises(DegenerateGeometryError, match="outside the field of view"):
+            optimal_diameter(folded, np.array([9000.0, 360.0]), POINT, BALL)
+
 
 class TestTightBox:
     @each_camera

@@ -87,10 +87,9 @@ def solved(*shifts: float, policy=PAPER):
         for key, camera, shift in zip(KEYS, cameras, shifts, strict=True)
     ]
     calibrations = [Calibration("given", camera) for camera in cameras]
-    meetings = triangulate_observation_pairs(
-        combinations(collect_ball_observations(views, calibrations), 2)
-    )
-    facts = collect_facts(views, calibrations, meetings)
+    sights = collect_ball_observations(views, calibrations)
+    meetings = triangulate_observation_pairs(combinations(sights, 2))
+    facts = collect_facts(views, calibrations, sights, meetings)
     spread = CovarianceOfMeanBall(facts)
     judgement = judge_groups(facts, policy, spread)
     return judge_pairs(meetings, judgement), compute_mean_ball(

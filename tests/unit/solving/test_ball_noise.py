@@ -19,14 +19,17 @@ from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, OPPOSITE
 
 UNIT = SIZE.diagonal / CLICK_DIAGONAL
 POINT = (30.0, 3.0, -1.0)
+SHARP = tuple((1e-20 * np.eye(8)).ravel().tolist())
 VIEWS = {"main": MAIN, "goal": BEHIND_GOAL, "opposite": OPPOSITE}
 
 
 def sights(noise_px, rng, source="lines", diameter=0.0):
     """A ball in three views, clicked with noise."""
+    covariance = SHARP if source == "lines" else None
     for key, camera in VIEWS.items():
         x, y = camera.project(np.array([POINT]))[0] + rng.normal(0, noise_px, 2)
-        yield BallObservation(key, Calibration(source, camera), (x, y), diameter, SIZE)
+        calibration = Calibration(source, camera, covariance=covariance)
+        yield BallObservation(key, calibration, (x, y), diameter, SIZE)
 
 
 def ball_in(views):
@@ -57,6 +60,11 @@ class TestMissesOf:
     def test_a_view_outside_the_valid_pairs_says_nothing(self):
         assert dataset(1.0, groups=1, views=("main",)) == []
 
+    def test_a_camera_that_its_lines_leave_open_says_nothing(self):
+        seen = list(sights(1.0, np.random.default_rng(0)))
+        seen[0] = replace(seen[0], calibration=Calibration("lines", MAIN))
+        assert len(compute_ray_residuals(ball_in(VIEWS), seen)) == 1
+
     def test_exact_clicks_leave_nothing(self):
         assert max(abs(item.miss) for item in dataset(0.0, groups=1)) < 1e-9
 
@@ -76,7 +84,7 @@ class TestEstimateBallNoise:
         assert found.low < sigma < found.high
 
     def test_one_wrong_ball_in_ten_does_no_harm(self):
-        misses = dataset(UNIT)
+        misses = dataset(UNIT, seed=1)
         wrong = [replace(item, miss=25.0) if n % 10 == 0 else item for n, item in enumerate(misses)]
         found = estimate_ball_noise(wrong, PAPER).click
         assert found.value == pytest.approx(1.0, rel=0.15)

@@ -33,7 +33,13 @@ SHARP = tuple((1e-12 * np.eye(8)).ravel().tolist())
 
 
 def torn(
-    keys: str, later: str = "", by=(0.0, 0.6, 0.0), ball=GRASS, covariance=SHARP, policy=PAPER
+    keys: str,
+    later: str = "",
+    by=(0.0, 0.6, 0.0),
+    ball=GRASS,
+    covariance=SHARP,
+    policy=PAPER,
+    source="lines",
 ):
     """Views of a ball, one of which shows it after it has moved on."""
     views = []
@@ -41,11 +47,10 @@ def torn(
         place = np.add(ball, by) if key == later else ball
         point = BallAnnotation(point=seen(CAMERAS[key], place))
         views.append(replace(given_view(key, CAMERAS[key], ball), balls=(point,)))
-    calibrations = [Calibration("lines", CAMERAS[key], covariance=covariance) for key in keys]
+    calibrations = [Calibration(source, CAMERAS[key], covariance=covariance) for key in keys]
     sights = collect_ball_observations(views, calibrations)
-    facts = collect_facts(
-        views, calibrations, triangulate_observation_pairs(combinations(sights, 2))
-    )
+    pairs = triangulate_observation_pairs(combinations(sights, 2))
+    facts = collect_facts(views, calibrations, sights, pairs)
     judgement = judge_groups(facts, policy, CovarianceOfMeanBall(facts))
     chi_square = compute_chi_square(keys, facts, judgement, policy)
     return chi_square, find_contradiction(chi_square, keys, facts, judgement, sights, policy)
@@ -100,10 +105,15 @@ class TestContradiction:
         assert found is not None and (found.view, found.gap_m) == (None, None)
 
     def test_with_a_given_camera_it_is_said_that_nobody_knows_how_exact_it_is(self) -> None:
-        chi_square, found = torn("abc", "c", by=(0.3, 0.4, 0.0), covariance=None, policy=WIDE)
+        given = {"covariance": None, "policy": WIDE, "source": "given"}
+        chi_square, found = torn("abc", "c", by=(0.3, 0.4, 0.0), **given)
         assert chi_square is not None and chi_square.p_value < LOW_P_VALUE
         assert found is not None and not found.is_known
         assert found.widening == pytest.approx((chi_square.value / 3) ** 0.5)
+
+    def test_a_camera_that_its_lines_leave_open_contradicts_nobody(self) -> None:
+        _, found = torn("abc", "c", by=(0.3, 0.4, 0.0), covariance=None, policy=WIDE)
+        assert found is None
 
     def test_what_no_ball_moves_in_a_second_is_no_motion(self) -> None:
         chi_square, _ = torn("ab")

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.geometry.resection import parameters_from_camera
 from app.soccer.policy import PAPER, Policy
 from app.soccer.solution import GATES
 from app.solving.ball_covariance import CovarianceOfMeanBall
@@ -23,6 +24,7 @@ from app.solving.judgement import (
     judge_with_known_view_failures,
     recompare_thresholds,
 )
+from tests.unit.solving.conftest import MAIN
 from tests.unit.solving.random_groups import random_policy, random_views
 
 
@@ -352,10 +354,24 @@ class TestJudge:
         # One pixel in either view moves the point by a metre along x; a click is one pixel.
         moved = np.zeros((1, 2, 2, 2, 3))
         moved[0, :, 0, :, 0] = [0.5, -0.5]
-        one = facts(pair_moved=moved, view_diagonal=np.full(2, np.hypot(1920, 1080)))
+        one = facts(
+            pair_moved=moved,
+            view_diagonal=np.full(2, np.hypot(1920, 1080)),
+            view_given=np.ones(2, bool),
+        )
         for limit, fails in ((np.sqrt(2) * 1.000001, []), (np.sqrt(2) * 0.999999, ["sigma"])):
             policy = replace(PAPER, max_sigma_m=float(limit), min_jac=0.0)
             assert failing(judged(one, policy)) == fails
+
+    def test_a_camera_that_its_lines_leave_open_fails_every_limit_of_sigma(self):
+        camera = {"view_parameters": np.tile(parameters_from_camera(MAIN, 500.0), (2, 1))}
+        known = np.tile(1e-6 * np.eye(8), (2, 1, 1))
+        unknown = known * np.array([1.0, 0.0])[:, None, None]
+        policy = replace(PAPER, max_sigma_m=1e6, min_jac=0.0)
+        assert failing(judged(facts(view_covariance=known, **camera), policy)) == []
+        assert failing(judged(facts(view_covariance=unknown, **camera), policy)) == ["sigma"]
+        given = facts(view_covariance=unknown, view_given=np.array([False, True]), **camera)
+        assert failing(judged(given, policy)) == []
 
     def test_without_a_ball_what_is_asked_of_it_fails(self):
         policy = replace(PAPER, max_sigma_m=9.0, min_parallax_degrees=1.0)

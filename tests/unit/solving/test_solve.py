@@ -1,16 +1,24 @@
+import json
 from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 import pytest
 
+from app.features.groups.solution_schemas import SolutionDocument
+from app.features.solutions.codec import (
+    from_json,
+    solution_json_text,
+    summarize_solution,
+    to_json,
+)
 from app.geometry.sphere import tight_box
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Station, View
-from app.soccer.pitch import Pitch, opposite_marking
+from app.soccer.pitch import MARKINGS, Pitch, opposite_marking
 from app.soccer.policy import PAPER, STRICT
-from app.soccer.solution import Calibration, MarkingFit, SuspectLabel
+from app.soccer.solution import Calibration, MarkingFit, Solution, SuspectLabel
 from app.solving.calibrate import calibrate_station
 from app.solving.calibration_findings import find_calibration_findings
 from app.solving.solve import solve_group
@@ -117,6 +125,82 @@ class TestWideLenses:
         wrong = [replace(one, station=replace(one.station, given=bare[one.key])) for one in views]
         found = solve_group(group(*wrong), PAPER)
         assert np.linalg.norm(np.array(found.ball.point) - BALL) > 1.0
+
+
+class TestCamerasThatLinesLeaveOpen:
+    """Parallel lines fit, and leave open where their camera stands."""
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def views(cls):
+        seen = looking((30.0, 60.0, -15.0), (30.0, 0.0, 0.0), 1100.0)
+        shown = view("a", seen, BALL, noise_px=0.3)
+        lines = {
+            name: points
+            for name, points in shown.station.lines.items()
+            if name.endswith(("top", "bottom"))
+        }
+        rest = tuple(name for name in MARKINGS if name not in lines)
+        shown = replace(shown, station=replace(shown.station, lines=lines, not_visible=rest))
+        others = zip("bc", (BEHIND_GOAL, OPPOSITE), (1, 2), strict=True)
+        return [shown, *(view(key, one, BALL, noise_px=0.3, seed=s) for key, one, s in others)]
+
+    def test_nothing_is_known_of_their_ball(self, views):
+        solution = solve_group(group(*views[:2]), replace(PAPER, max_sigma_m=1e6))
+        assert solution.views[0].calibration.is_left_open
+        assert (solution.ball.sigma_m, solution.best_ball) == (np.inf, None)
+        failing = solution.first_failing
+        assert (failing.name, failing.view) == ("sigma", "a")
+        assert failing.sentence == "the lines of view A leave its camera open"
+        (finding,) = [one for one in solution.findings if one.kind == "high_uncertainty"]
+        assert finding.is_unusable_ball and failing.sentence in finding.sentence
+        assert all(not np.isfinite(one.expected.covariance).any() for one in solution.views)
+
+    def test_what_is_stored_and_served_has_no_infinity(self, views):
+        said = group(*views[:2])
+        solution = solve_group(said, PAPER)
+        assert solution.passes
+        stored = solution_json_text(to_json(solution))
+        assert from_json(Solution, json.loads(stored)) == solution
+        served = SolutionDocument.of(solution, said).model_dump_json()
+        for text in (stored, served):
+            json.loads(text, parse_constant=pytest.fail)
+        assert summarize_solution(said, solution).sigma_m is None
+
+    def test_the_most_likely_ball_rests_on_the_others(self, views):
+        best = solve_group(group(*views), PAPER).best_ball
+        assert (best.views, best.contradicting) == (("b", "c"), ())
+        assert np.linalg.norm(np.array(best.point) - BALL) < 0.2
+
+
+class TestBallsBeyondTheLens:
+    """No ray goes through a pixel that lies where the lens has folded the picture."""
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def views(cls):
+        fold = np.array([-0.35, *[0.0] * 11])
+        lost = replace(looking((-40.0, 50.0, -15.0), BALL, 400.0), distortion=fold)
+        beyond = replace(
+            given_view("c", lost, BALL), balls=(BallAnnotation(box=Box(1270.0, 710.0, 8.0, 8.0)),)
+        )
+        return [given_view("a", MAIN, BALL), given_view("b", BEHIND_GOAL, BALL), beyond]
+
+    def test_are_no_balls_that_are_seen(self, views):
+        solution = solve_group(group(views[0], views[2]), PAPER)
+        failing = solution.first_failing
+        assert (failing.name, failing.value, failing.view) == ("ball", 1.0, "c")
+        assert failing.sentence == (
+            "in 1 view, no ray goes through it: it lies beyond what the lens of view B shows"
+        )
+
+    def test_store_no_nan(self, views):
+        solution = solve_group(group(*views), PAPER)
+        assert solution.passes
+        fit = solution.views[2].ball
+        assert (fit.optimized_diameter_px, fit.optimized_box, fit.size_ratio) == (None, None, None)
+        assert (fit.optimized_error_m, fit.depth_per_px_m) == (None, None)
+        json.dumps(to_json(solution), allow_nan=False)
 
 
 class TestSolve:
