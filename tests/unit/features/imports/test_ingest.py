@@ -11,6 +11,7 @@ from app.errors import ConflictError, NotFoundError
 from app.features.datasets.service import get_dataset, list_datasets
 from app.features.groups.edit import SetLines, SetStationLines, SetViewInclusion, make_set_ball_edit
 from app.features.groups.history import read_history
+from app.features.groups.revision_queries import refresh_inputs_hashes
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.groups.undo import undo_group_edit
@@ -351,6 +352,10 @@ class TestAChangedSource:
         again(store, replace(one, match="m"))
         state = load_group_state(store, number)
         assert (state.group.match, state.solution) == ("m", None)
+        with store.write() as session:
+            refresh_inputs_hashes(session, [number])
+        again_read = load_group_state(store, number).stored
+        assert again_read.inputs_hash == state.stored.inputs_hash
 
     def test_a_static_camera_that_changed_counts_as_changed_once(
         self, store, fill, make_static, monkeypatch
