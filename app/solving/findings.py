@@ -14,7 +14,11 @@ from app.solving.ball_3d import explain_implausible_position
 from app.solving.calibration_findings import find_calibration_findings, find_paint_findings
 from app.solving.chi_square import LOW_P_VALUE
 from app.solving.contradiction import SPEEDS, TYPICAL_SPEED, Contradiction
-from app.solving.gate_sentences import describe_odds, describe_open_cameras, find_larger_error_in_tau
+from app.solving.gate_sentences import (
+    describe_odds,
+    describe_open_cameras,
+    find_larger_error_in_tau,
+)
 from app.solving.sides import SwappedView, find_swapped_views
 from app.solving.triangulate import BallObservation
 from app.wording import format_degrees, format_metres, format_pixels, plural
