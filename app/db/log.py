@@ -11,6 +11,7 @@ from sqlalchemy import (
     ColumnElement,
     Index,
     LargeBinary,
+    Row,
     Table,
     bindparam,
     func,
@@ -22,7 +23,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 from zlib_ng import zlib_ng
 
 from app.db.dialects.dialect import get_session_dialect
-from app.db.json_columns import Json, decompress_json
+from app.db.json_columns import Json, decompress, decompress_json
 from app.db.session import Base, Session
 from app.errors import DamagedError
 from app.json_text import canonical_json_text
@@ -224,6 +225,13 @@ def read_entry(session: Session, log_id: int) -> LogEntry:
 
 def read_log(session: Session, *where: ColumnElement[bool], after: int = 0) -> Iterator[LogEntry]:
     """Entries in order, in batches, so that a long log fits into memory."""
+    for row in _iterate_rows(session, *where, after=after):
+        yield LogEntry(**{**row._mapping, "body": decompress_json(row.body)})
+
+
+def _iterate_rows(
+    session: Session, *where: ColumnElement[bool], after: int = 0
+) -> Iterator[Row[Any]]:
     while True:
         rows = session.execute(
             select(*(getattr(LogModel, name) for name in (*_COLUMNS, "body", "id", "hash")))
@@ -231,8 +239,7 @@ def read_log(session: Session, *where: ColumnElement[bool], after: int = 0) -> I
             .order_by(LogModel.id)
             .limit(_BATCH)
         ).all()
-        for row in rows:
-            yield LogEntry(**{**row._mapping, "body": decompress_json(row.body)})
+        yield from rows
         if len(rows) < _BATCH:
             return
         after = rows[-1].id
@@ -263,21 +270,22 @@ def verify_chain(session: Session) -> int:
         DamagedError: A row was changed, removed or put in from outside.
     """
     count, previous = 0, GENESIS
-    for entry in read_log(session):
+    for row in _iterate_rows(session):
         count += 1
-        previous = compute_chain_hash(
-            previous, count, entry, canonical_json_text(entry.body).encode()
-        )
-        if entry.id != count or entry.hash != previous:
+        # The bytes as they were written: the value that is read of them may be another.
+        previous = compute_chain_hash(previous, count, row, decompress(row.body))
+        if row.id != count or row.hash != previous:
             raise DamagedError(
-                f"row {entry.id} of the log was changed or is damaged: its hash does not continue"
+                f"row {row.id} of the log was changed or is damaged: its hash does not continue"
                 " the hash chain",
                 hint=get_session_dialect(session).restoring,
             )
     return count
 
 
-def compute_chain_hash(previous: str, number: int, entry: NewLogEntry, body: bytes) -> str:
+def compute_chain_hash(
+    previous: str, number: int, entry: NewLogEntry | Row[Any], body: bytes
+) -> str:
     """Hash of a row: SHA-256 over the hash before it, its columns and the hash of its body.
 
     Args:

@@ -135,7 +135,8 @@ def read_json(
             are kept, for a reader that refuses them field by field (``fields.parse_number``).
         max_bytes: Longest text that is looked at.
         report: Takes a remark for each NaN, Infinity and number that is too large, which are null
-            in the value: what is left out for want of it, the reader of its field says.
+            in the value: what is left out for want of it, the reader of its field says. It takes a
+            remark for characters U+0000, too, which are U+FFFD in the value.
 
     Raises:
         DatasetFormatError: Not JSON, too long, nested too deeply, or (without ``report``) with a
@@ -191,6 +192,8 @@ def _parse_json(
             value = json.loads(text)
         if report is not None and _INFINITE.search(content):
             value = _replace_non_finite(value, path, report)
+        if b"\\u0000" in content:
+            value = _replace_null_characters(value, path, record, report)
         if _SURROGATE.search(content):
             json.dumps(value, ensure_ascii=False).encode()
         return value
@@ -236,6 +239,8 @@ def parse_literal(
         else:
             value = ast.literal_eval(text.strip())
         _require_plain_values(value)
+        if "\\" in text:
+            value = _replace_null_characters(value, path, record, report)
     except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError) as error:
         raise DatasetFormatError(path, record, None, problem) from error
     return value
@@ -308,6 +313,30 @@ def _replace_non_finite(value: Any, path: str, report: ReaderReport) -> Any:
         shown = ", ".join(f"{name} ({count:,})" for name, count in fields.most_common(5))
         problem = f"{len(found) - MAX_NAMED:,} more numbers are not finite: {shown}"
         _report_non_finite(report, path, None, None, problem)
+    return value
+
+
+def _replace_null_characters(
+    value: Any, path: str, record: str | None, report: ReaderReport | None
+) -> Any:
+    """The value with U+FFFD for each U+0000, which no text of a database holds; they are counted."""
+    count = 0
+
+    def copy(item: Any) -> Any:
+        nonlocal count
+        if isinstance(item, str):
+            count += item.count("\0")
+            return item.replace("\0", "\ufffd")
+        if isinstance(item, dict):
+            return {copy(name): copy(part) for name, part in item.items()}
+        if isinstance(item, (list, tuple)):
+            return type(item)(map(copy, item))
+        return item
+
+    value = copy(value)
+    if count and report is not None:
+        what = f"holds {plural(count, 'character')} U+0000, which cannot be stored; read as U+FFFD"
+        report.add_remark(DatasetFormatError(path, record, None, what).message)
     return value
 
 

@@ -13,13 +13,14 @@ from app.errors import DatasetFormatError
 from app.formats.json_reader import MAX_DEPTH, MAX_NAMED, parse_literal, read_json, read_json_lines
 from app.formats.report import ReaderReport
 
+TEXT = st.text(st.characters(exclude_categories=("Cs",), exclude_characters="\0"))
 PLAIN = st.recursive(
     st.none()
     | st.booleans()
     | st.integers()
-    | st.text()
+    | TEXT
     | st.floats(allow_nan=False, allow_infinity=False),
-    lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
+    lambda inner: st.lists(inner) | st.dictionaries(TEXT, inner),
     max_leaves=20,
 )
 
@@ -55,6 +56,23 @@ class TestReadJson:
         assert remark.endswith("read as missing")
         # Where it is of no use, it is left out by whoever reads the field.
         assert report.problems == []
+
+    @pytest.mark.parametrize(
+        "text",
+        [
+            r'{"a\u0000": ["b\u0000", "c\\u0000"]}',
+            json.dumps(r'{"a\u0000": ["b\u0000", "c\\u0000"]}'),
+            json.dumps(r"{'a\0': ['b\x00', 'c\\u0000']}"),
+        ],
+    )
+    def test_u0000_which_no_database_holds_is_replaced_and_counted(self, text: str) -> None:
+        report = ReaderReport()
+        value = read_json(text.encode(), "f", report=report, double_encoded=True)
+        assert value == {"a\ufffd": ["b\ufffd", "c\\u0000"]}
+        assert report.remarks == [
+            "f: holds 2 characters U+0000, which cannot be stored; read as U+FFFD"
+        ]
+        assert read_json(text.encode(), "f", double_encoded=True) == value
 
     def test_of_many_bad_numbers_the_first_are_named_and_the_rest_are_counted(self) -> None:
         report = ReaderReport()
