@@ -65,17 +65,17 @@ def apply_entry(snapshot: StateSnapshot, entry: LogEntry, number: int = 0) -> No
         _STEPS[entry.kind](snapshot, entry)
 
 
-def rebuild_tables(store: Store) -> int:
-    """Write groups, views, stations and what belongs to them anew from the log.
+def rebuild_tables(store: Store) -> list[str]:
+    """Write groups, views, stations and what imports noticed of them anew from the log.
 
-    Datasets, verdicts, dismissals, solutions and the log itself stay, and so do predictions and proposals as
-    far as their views do. Returns the number of groups.
+    Everything else stays as far as its groups and views do. Returns sentences about the rows of other
+    tables that do not: ``replace_all_rows``.
     """
     with store.write() as session:
         snapshot = replay_log(session)
-        replace_all_rows(session, **_build_rows_by_table(snapshot))
+        left_out = replace_all_rows(session, **_build_rows_by_table(snapshot))
         refresh_queue(session, list(snapshot.groups))
-    return len(snapshot.groups)
+    return left_out
 
 
 def _replay_dataset(snapshot: StateSnapshot, entry: LogEntry) -> None:
@@ -249,7 +249,9 @@ def _replay_dataset_deletion(snapshot: StateSnapshot, entry: LogEntry) -> None:
     for place in [place for place in snapshot.unassigned if place[0] == gone]:
         del snapshot.unassigned[place]
     snapshot.noticed = {
-        item for item in snapshot.noticed if item[0] not in groups and item[1] not in stations
+        place: said
+        for place, said in snapshot.noticed.items()
+        if place[0] not in groups and place[1] not in stations
     }
 
 
@@ -266,11 +268,10 @@ def _replay_import_findings(
     kept: list[list[str | None]],
 ) -> None:
     """Each import replaces what the ones before it noticed in the same place."""
-    place = (group_id, station_id)
-    snapshot.noticed = {item for item in snapshot.noticed if item[:2] != place}
-    for view, sentence in kept:
-        if sentence is not None:
-            snapshot.noticed.add((*place, view, sentence))
+    said = {(view, sentence) for view, sentence in kept if sentence is not None}
+    snapshot.noticed.pop((group_id, station_id), None)
+    if said:
+        snapshot.noticed[group_id, station_id] = said
 
 
 def _build_rows_by_table(snapshot: StateSnapshot) -> dict[str, list[dict[str, Any]]]:
@@ -298,7 +299,9 @@ def _build_rows_by_table(snapshot: StateSnapshot) -> dict[str, list[dict[str, An
     ]
     noticed = [
         {"group_id": group, "station_id": station, "view": view, "kind": KIND, "sentence": sentence}
-        for group, station, view, sentence in sorted(snapshot.noticed, key=repr)
+        for group, station, view, sentence in sorted(
+            ((*place, *item) for place, said in snapshot.noticed.items() for item in said), key=repr
+        )
     ]
     unassigned = [
         {

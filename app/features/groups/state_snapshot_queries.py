@@ -11,13 +11,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from sqlalchemy import delete, insert, select, text
+from sqlalchemy import and_, delete, insert, or_, select, text
 
 from app.db.dialects.dialect import DeferReferences
 from app.db.json_columns import decompress_json
 from app.db.session import Session
 from app.features.datasets.queries import list_dataset_rows, parse_stored_policy
 from app.features.datasets.tables import (
+    GroupChangeModel,
     GroupModel,
     ImportFindingModel,
     StationModel,
@@ -35,8 +36,10 @@ from app.soccer.codec import extras_from_json, hash_group_inputs, paint_digests_
 from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 from app.soccer.policy import Policy
+from app.wording import plural
 
 _BATCH = 500
+_MOST_NAMED = 10
 Rows = Sequence[Mapping[str, Any]]
 
 
@@ -84,16 +87,21 @@ def list_all_import_findings(session: Session) -> Sequence[ImportFindingModel]:
 
 def replace_all_rows(
     session: Session, *, stations: Rows, groups: Rows, views: Rows, noticed: Rows, unassigned: Rows
-) -> None:
-    """Put rows in the place of all stations, groups, views and what hangs on them.
+) -> list[str]:
+    """Put rows in the place of all stations, groups, views and what imports noticed of them.
 
-    Datasets, verdicts, dismissals and solutions stay, and so do predictions and proposals of views that are
-    there afterwards; the queue is the caller's to refresh.
+    Everything else stays where its groups and views are there afterwards, but for marks of changes, which
+    triggers write anew; the queue is the caller's to refresh.
+
+    Returns:
+        Sentences: rows of which tables are left out, and of which groups or views that are no more.
     """
     # Solutions and verdicts refer to groups, which are gone for a moment.
     session.execute(DeferReferences())
-    with _preserve_view_dependent_rows(session):
-        for model in (QueueModel, ImportFindingModel, UnassignedFrameModel, ViewModel):
+    noticed_by_imports = delete(ImportFindingModel).where(ImportFindingModel.kind.not_in(SEEN))
+    with _preserve_dependent_rows(session) as left_out:
+        session.execute(noticed_by_imports)
+        for model in (QueueModel, UnassignedFrameModel, ViewModel):
             session.execute(delete(model))
         session.execute(delete(GroupModel))
         session.execute(delete(StationModel))
@@ -106,33 +114,68 @@ def replace_all_rows(
         ):
             if rows:
                 session.execute(insert(table), rows)
+    left_out.extend(_delete_lost_findings(session))
+    return left_out
 
 
 @contextmanager
-def _preserve_view_dependent_rows(session: Session) -> Iterator[None]:
-    """What goes with its view and is in no log comes back after this, where its view did."""
-    for table in _list_view_dependent_tables():
+def _preserve_dependent_rows(session: Session) -> Iterator[list[str]]:
+    """What goes with its group or view and is in no log comes back after this, where these did; yields
+    the sentences about what does not, which are there afterwards."""
+    dependent, left_out = _list_dependent_tables(), list[str]()
+    for table in dependent:
         session.execute(text(f"CREATE TEMP TABLE kept_{table} AS SELECT * FROM {table}"))
-    yield
-    for table in _list_view_dependent_tables():
-        session.execute(
-            text(
-                f"INSERT INTO {table} SELECT * FROM kept_{table}"
-                " WHERE view_id IN (SELECT id FROM view)"
+    yield left_out
+    for table, keys in dependent.items():
+        for column, parent in keys:
+            lost = text(
+                f"DELETE FROM kept_{table} WHERE {column} NOT IN (SELECT id FROM {parent})"
+                f" RETURNING {column}"
             )
-        )
+            left_out.extend(_describe_lost_rows(table, parent, session.scalars(lost).all()))
+        session.execute(text(f"INSERT INTO {table} SELECT * FROM kept_{table}"))
         session.execute(text(f"DROP TABLE kept_{table}"))
 
 
-def _list_view_dependent_tables() -> list[str]:
-    """Names of the tables whose rows are deleted with the view that they are about."""
-    return [
-        table.name
-        for table in Base.metadata.sorted_tables
-        if any(
-            key.column.table is ViewModel.__table__ and key.ondelete == "CASCADE"
+def _list_dependent_tables() -> dict[str, list[tuple[str, str]]]:
+    """Names of the tables whose rows are deleted with the group or view that they are about, with the
+    columns that name these and the tables of these."""
+    gone, dependent = {"groups", "view"}, dict[str, list[tuple[str, str]]]()
+    for table in Base.metadata.sorted_tables:
+        keys = [
+            (key.parent.name, key.column.table.name)
             for key in table.foreign_keys
-        )
+            if key.column.table.name in gone and key.ondelete == "CASCADE"
+        ]
+        if keys and table is not GroupChangeModel.__table__:
+            gone.add(table.name)
+            dependent[table.name] = sorted(keys)
+    return dependent
+
+
+def _delete_lost_findings(session: Session) -> list[str]:
+    """Delete what was computed or seen of groups and views that are no more."""
+    model = ImportFindingModel
+    views = select(ViewModel.id).where(
+        ViewModel.group_id == model.group_id, ViewModel.key == model.view
+    )
+    there = select(GroupModel.id).where(GroupModel.id == model.group_id)
+    lost = delete(model).where(
+        model.kind.in_(SEEN),
+        or_(~there.exists(), and_(model.view.is_not(None), ~views.exists())),
+    )
+    ids = session.scalars(lost.returning(model.group_id)).all()
+    return _describe_lost_rows(model.__tablename__, "groups or views of groups", ids)
+
+
+def _describe_lost_rows(table: str, of: str, ids: Sequence[int | None]) -> list[str]:
+    if not ids:
+        return []
+    named = sorted({number for number in ids if number is not None})
+    more = f" and {len(named) - _MOST_NAMED:,} more" if len(named) > _MOST_NAMED else ""
+    return [
+        f"{plural(len(ids), 'row')} of the table {table} left out: the log does not have {of}"
+        f" {', '.join(map(str, named[:_MOST_NAMED]))}{more}"
     ]
 
 
@@ -185,7 +228,7 @@ class StateSnapshot:
         verdicts: By group, oldest first, as logged.
         dismissals: Of findings, in the same way.
         unassigned: By dataset, camera and frame.
-        noticed: What imports noticed: (group or None, station or None, view, sentence).
+        noticed: What imports noticed, by (group or None, station or None): pairs (view or None, sentence).
     """
 
     datasets: dict[int, tuple[str, Policy]] = field(default_factory=dict)
@@ -194,7 +237,9 @@ class StateSnapshot:
     verdicts: dict[int, list[dict[str, Any]]] = field(default_factory=dict)
     dismissals: dict[int, list[dict[str, Any]]] = field(default_factory=dict)
     unassigned: dict[tuple[int, str, str], Extras] = field(default_factory=dict)
-    noticed: set[tuple[int | None, int | None, str | None, str]] = field(default_factory=set)
+    noticed: dict[tuple[int | None, int | None], set[tuple[str | None, str]]] = field(
+        default_factory=dict
+    )
 
     def group(self, group_id: int) -> Group:
         """A group whole but for the paint of its pictures, with the stations as they are now."""
@@ -234,7 +279,8 @@ def read_state_snapshot(session: Session) -> StateSnapshot:
         place = (unassigned.dataset_id, unassigned.camera, unassigned.frame)
         snapshot.unassigned[place] = extras_from_json(decompress_json(unassigned.extras))
     for noticed in list_all_import_findings(session):
-        snapshot.noticed.add((noticed.group_id, noticed.station_id, noticed.view, noticed.sentence))
+        of_place = snapshot.noticed.setdefault((noticed.group_id, noticed.station_id), set())
+        of_place.add((noticed.view, noticed.sentence))
     return snapshot
 
 

@@ -9,7 +9,7 @@ import typer
 
 from app.terminal.options import Json, read_settings
 from app.terminal.server import open_store, require_no_server
-from app.terminal.terminal import print_json, say
+from app.terminal.terminal import print_error, print_json, say
 from app.wording import plural
 
 commands = typer.Typer()
@@ -31,7 +31,8 @@ def doctor(
     settings = read_settings()
     if rebuild:
         with hold_server_lock(settings), open_store(settings) as store:
-            rebuild_tables(store)
+            for sentence in rebuild_tables(store):
+                print_error(sentence)
     require_no_server()
     checks = examine_everything(settings)
     if json_:

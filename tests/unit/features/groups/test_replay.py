@@ -1,16 +1,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
-from sqlalchemy import text
+from sqlalchemy import Table, func, insert, select, text
 
+from app.db.session import Session
 from app.db.store import Store
 from app.errors import StorageError
+from app.features.datasets.tables import GroupModel, ImportFindingModel, StationModel, ViewModel
+from app.features.findings.queries import SEEN
 from app.features.groups.edit import SetLines, SetStationLines, SetViewInclusion, make_set_ball_edit
 from app.features.groups.group_edits import apply_noise_factors
 from app.features.groups.replay import rebuild_tables, replay_log
-from app.features.groups.state_snapshot_queries import read_state_snapshot
+from app.features.groups.state_snapshot_queries import read_state_snapshot, replace_all_rows
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.groups.undo import redo_group_edit, undo_group_edit
 from app.features.imports.cameras import import_given_cameras
@@ -18,6 +22,7 @@ from app.features.imports.ingest import UnassignedFrame, import_groups, import_u
 from app.features.match_estimates.queries import NoiseFactor
 from app.features.policies.service import change_policy
 from app.features.stations.service import load_station, submit_station_edit, undo_station
+from app.features.tables import Base
 from app.features.verdicts.service import set_verdict
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
@@ -127,8 +132,89 @@ class TestRebuild:
             session.execute(text("DELETE FROM queue"))
             session.execute(text("DELETE FROM view WHERE key = '7.png'"))
             session.execute(text("UPDATE station SET lines = '{}'"))
-        assert rebuild_tables(busy) == 4
+        assert rebuild_tables(busy) == []
         with busy.read() as session:
             assert read_state_snapshot(session) == before
             again = session.execute(text("SELECT * FROM queue ORDER BY group_id")).all()
         assert again == queue
+
+    def test_rows_of_other_tables_stay_with_their_groups_and_views(
+        self, store: Store, fill, make_group
+    ) -> None:
+        ids = fill(make_group(7), make_group(8))
+        with store.write() as session:
+            tables = [_insert_row(session, table) for table in _list_cascading_tables()]
+            said = [{"group_id": ids[0], "kind": kind, "sentence": kind} for kind in SEEN]
+            session.execute(insert(ImportFindingModel), said)
+        assert {"take", "gold", "lease", "agreement", "batch_group", "prediction"} < set(tables)
+        before = _read_all_rows(store)
+        assert rebuild_tables(store) == []
+        assert _read_all_rows(store) == before
+
+    def test_rows_of_what_is_no_more_are_counted_and_named(
+        self, store: Store, fill, make_group
+    ) -> None:
+        ids = fill(make_group(7), make_group(8))
+        with store.write() as session:
+            for table in _list_cascading_tables():
+                _insert_row(session, table)
+            said = {"group_id": ids[0], "view": "none.png", "kind": SEEN[0], "sentence": "odd"}
+            session.execute(insert(ImportFindingModel), [said])
+            stations, groups, views = (
+                [dict(row._mapping) for row in session.execute(select(*model.__table__.columns))]
+                for model in (StationModel, GroupModel, ViewModel)
+            )
+            session.execute(text("DELETE FROM solution"))
+            left_out = replace_all_rows(
+                session,
+                stations=stations,
+                groups=groups[1:],
+                views=[row for row in views if row["group_id"] != ids[0]],
+                noticed=[],
+                unassigned=[],
+            )
+        has_not = "left out: the log does not have"
+        assert f"1 row of the table gold {has_not} groups {ids[0]}" in left_out
+        assert f"1 row of the table proposal {has_not} view {views[0]['id']}" in left_out
+        named = f"1 row of the table import_finding {has_not} groups or views of groups {ids[0]}"
+        assert left_out[-1] == named
+        assert len(left_out) == len(_list_cascading_tables()) + 1
+
+
+def _list_cascading_tables() -> list[Table]:
+    """Tables whose rows go with a group or a view, but for marks, which triggers write."""
+    return [
+        table
+        for table in Base.metadata.sorted_tables
+        if table.name != "group_change"
+        and any(
+            key.column.table.name in ("groups", "view") and key.ondelete == "CASCADE"
+            for key in table.foreign_keys
+        )
+    ]
+
+
+def _insert_row(session: Session, table: Table) -> str:
+    """A row of the table that refers to the first rows of others, which are made where there are none."""
+    values: dict[str, Any] = {}
+    for column in table.columns:
+        for key in column.foreign_keys:
+            first = select(func.min(key.column))
+            if session.scalar(first) is None:
+                _insert_row(session, key.column.table)
+            values[column.key] = session.scalar(first)
+        if not column.foreign_keys and not column.nullable:
+            made = {int: 1, str: "x", bytes: b"x", float: 1.0, bool: False}
+            values[column.key] = made[column.type.python_type]
+    session.execute(insert(table), [values])
+    return table.name
+
+
+def _read_all_rows(store: Store) -> dict[str, list[str]]:
+    """The rows of every table but those of marks, which are written anew."""
+    with store.read() as session:
+        return {
+            table.name: sorted(map(repr, session.execute(select(*table.columns))))
+            for table in Base.metadata.sorted_tables
+            if table.name not in ("group_change", "queue")
+        }

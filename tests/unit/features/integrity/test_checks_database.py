@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import zlib
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 from sqlalchemy import text
 
+from app.db.backup import write_backup
 from app.db.check import CheckResult
 from app.db.dialects.dialect import get_dialect
 from app.db.store import Store
@@ -17,10 +19,11 @@ from app.features.findings.service import FindingReference, set_dismissal
 from app.features.groups.queries import read_groups
 from app.features.groups.replay import rebuild_tables
 from app.features.groups.submit import load_group_state
+from app.features.imports.ingest import import_groups
 from app.features.integrity.checks import REBUILD, examine_database
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
-from app.soccer.annotation import make_lines
+from app.soccer.annotation import Extras, make_lines
 from app.soccer.codec import hash_group_inputs
 from tests.databases import said_for_sqlite
 from tests.unit.stores import OPPOSITE
@@ -260,6 +263,18 @@ class TestExamine:
         for digest, healthy in ((before, True), ("x", False)):
             change(store, f"UPDATE groups SET inputs_hash = '{digest}' WHERE id = {number}")
             assert ("digests" not in faults(store)) == healthy
+
+    def test_a_text_with_u0000_in_the_log_is_no_fault_and_is_backed_up(
+        self, store: Store, make_group, tmp_path: Path
+    ) -> None:
+        group = make_group(1)
+        odd = replace(group.views[0], extras=Extras(metadata={"comment": "a\0b"}))
+        import_groups(store, "demo", [group.with_view(odd)], source="test", actor="ann")
+        assert faults(store) == {}
+        rebuild_tables(store)
+        assert faults(store) == {}
+        if get_dialect(store.settings).is_file:
+            write_backup(store.settings, tmp_path / "backup.zip")
 
     def test_a_verdict_that_was_changed_needs_a_backup(self, store: Store, ids) -> None:
         trigger = "DROP TRIGGER verdict_refuses_update"
