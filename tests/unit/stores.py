@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from sqlalchemy import delete, insert, select
+from sqlalchemy import Table, delete, func, insert, select
 
+from app.db.session import Session
 from app.db.store import Store
 from app.features.datasets.service import get_dataset
 from app.features.datasets.tables import DatasetModel
@@ -243,3 +244,18 @@ def state(store: Store, fill: Fill, make_group: MakeGroup) -> GroupState:
 def opposite() -> Camera:
     """A camera on the far side of the pitch."""
     return OPPOSITE
+
+
+def insert_row(session: Session, table: Table, **values: Any) -> str:
+    """A row of the table that refers to the first rows of others, which are made where there are none."""
+    made = {int: 1, str: "x", bytes: b"x", float: 1.0, bool: False}
+    for column in table.columns:
+        for key in column.foreign_keys:
+            first = select(func.min(key.column))
+            if session.scalar(first) is None:
+                insert_row(session, key.column.table)
+            values[column.key] = session.scalar(first)
+        if not column.foreign_keys and not column.nullable:
+            values.setdefault(column.key, made[column.type.python_type])
+    session.execute(insert(table), [values])
+    return table.name

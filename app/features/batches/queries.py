@@ -34,6 +34,7 @@ from app.features.batches.tables import (
     LeaseModel,
 )
 from app.features.datasets.tables import DatasetModel
+from app.features.groups.insert_queries import find_next_row_id, reserve_row_ids
 from app.features.independent_annotations.tables import IndependentAnnotationModel
 from app.features.people.tables import PersonModel
 from app.features.people.visibility_queries import visible_groups_condition
@@ -165,9 +166,14 @@ def list_unfinished_batches(session: Session, dataset_ids: Collection[int]) -> l
 
 
 def insert_batch(session: Session, values: Mapping[str, Any]) -> int:
-    """Insert a batch, from columns of ``BatchModel`` but its id; returns its id."""
-    done = session.execute(insert(BatchModel).returning(BatchModel.id), dict(values))
-    return int(done.scalar_one())
+    """Insert a batch, from columns of ``BatchModel`` but its id; returns its id.
+
+    Independent annotations name batches that are gone, too, of which older versions reserved no id.
+    """
+    named = session.scalar(select(func.max(IndependentAnnotationModel.batch_id))) or 0
+    identity = max(find_next_row_id(session, BatchModel), named + 1)
+    session.execute(insert(BatchModel), [{"id": identity, **values}])
+    return identity
 
 
 def update_batch(session: Session, batch_id: int, values: Mapping[str, Any]) -> None:
@@ -177,6 +183,7 @@ def update_batch(session: Session, batch_id: int, values: Mapping[str, Any]) -> 
 
 def delete_batch(session: Session, batch_id: int) -> None:
     """Delete a batch with all that hangs on it; what was said of its groups stays."""
+    reserve_row_ids(session, BatchModel)
     session.execute(delete(BatchModel).where(BatchModel.id == batch_id))
 
 

@@ -11,7 +11,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.session import Base, Session
 from app.features.datasets.tables import DatasetModel, GroupModel, ViewModel
-from app.features.groups.insert_queries import find_next_row_id
+from app.features.groups.insert_queries import find_next_row_id, reserve_row_ids
 from app.features.people.tables import PersonModel
 from app.features.people.visibility_queries import shown_actor_column
 
@@ -276,6 +276,7 @@ def set_thread_resolved(
 
 def delete_thread(session: Session, thread_id: int) -> None:
     """Delete a thread with its comments."""
+    reserve_row_ids(session, ThreadModel, CommentModel)
     session.execute(delete(ThreadModel).where(ThreadModel.id == thread_id))
 
 

@@ -25,6 +25,7 @@ from app.features.groups.insert_queries import (
     camera_positions_to_column,
     group_to_columns,
     paint_to_column,
+    reserve_row_ids,
     station_to_columns,
     view_to_columns,
 )
@@ -223,6 +224,8 @@ def _save_view(
 
 
 def _delete_views(session: Session, stored: StoredGroup, keys: set[str]) -> None:
+    if keys:
+        reserve_row_ids(session, ViewModel, StationModel)
     for key in keys:
         session.execute(delete(ViewModel).where(ViewModel.id == stored.view_ids[key]))
         own = stored.stations[key]

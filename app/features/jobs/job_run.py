@@ -114,6 +114,11 @@ class JobProgress:
         """Whether an earlier server was at it, which may have done some of it."""
         return self.job.tries > 0 or self.job.done > 0
 
+    @property
+    def is_stopping(self) -> bool:
+        """Whether this process shall carry it out no more."""
+        return self._closing.is_set()
+
     def require_not_cancelled(self) -> None:
         """Raise ``JobCancelled`` where somebody cancelled it; a server that stops did not."""
         if self.cancelled.is_set():

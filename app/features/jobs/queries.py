@@ -14,7 +14,7 @@ from app.db.dialects.dialect import json_member
 from app.db.json_columns import Json, parse_json_column
 from app.db.session import Base, Session, format_utc_time, now
 from app.features.datasets.tables import DatasetModel
-from app.features.groups.insert_queries import find_next_row_id
+from app.features.groups.insert_queries import find_next_row_id, reserve_row_ids
 from app.features.people.visibility_queries import (
     EVERYTHING,
     Visibility,
@@ -141,6 +141,15 @@ def insert_job(session: Session, job: NewJob) -> int:
     return identity
 
 
+def find_end_time(session: Session) -> str:
+    """When a job ends whose end is written now: later than every end before it, whatever the clock says, since
+    webhooks are told of ends in that order."""
+    at, last = now(), session.scalar(select(func.max(JobModel.ended)))
+    if last is None or last < at:
+        return at
+    return format_utc_time(datetime.fromisoformat(last) + timedelta(microseconds=1))
+
+
 def update_job(session: Session, job_id: int, *, begun: int = 0, **values: Any) -> None:
     """Set columns of a job; ``result`` and ``problem`` are JSON values, ``begun`` adds to its tries."""
     if begun:
@@ -223,11 +232,13 @@ def count_jobs(session: Session) -> dict[tuple[str, str], int]:
 
 def delete_job(session: Session, job_id: int) -> None:
     """Forget one job."""
+    reserve_row_ids(session, JobModel)
     session.execute(delete(JobModel).where(JobModel.id == job_id))
 
 
 def delete_oldest_jobs(session: Session, kind: str, keep: int) -> None:
     """Forget the oldest jobs of a kind that are over, so that the table does not grow forever."""
+    reserve_row_ids(session, JobModel)
     oldest = (
         select(JobModel.id)
         .where(JobModel.kind == kind, JobModel.state.not_in(OPEN))
@@ -243,6 +254,7 @@ def delete_old_jobs(session: Session, days: int) -> int:
     Returns:
         How many.
     """
+    reserve_row_ids(session, JobModel)
     oldest = format_utc_time(datetime.now(UTC) - timedelta(days=days))
     gone = (
         delete(JobModel)

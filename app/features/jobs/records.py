@@ -17,6 +17,7 @@ from app.features.jobs.queries import (
     FAILED,
     OPEN,
     delete_job,
+    find_end_time,
     list_job_ids_of_kind,
     read_job,
     read_jobs,
@@ -121,7 +122,7 @@ class JobRecords:
     def _save_end(self, job_id: int, by: str | None = None, **values: Any) -> Job | None:
         """Save how a job ended, and tell who asked for it, at once; ``by``: see ``cancel``."""
         with self._store.write() as session:
-            update_job(session, job_id, **values)
+            update_job(session, job_id, ended=find_end_time(session), **values)
             job = read_job(session, job_id)
             if job is not None:
                 record_cancellation(session, job, by)

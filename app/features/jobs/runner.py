@@ -32,6 +32,7 @@ from app.features.jobs.queries import (
     WAITING,
     Job,
     delete_oldest_jobs,
+    find_end_time,
     read_jobs,
     update_job,
 )
@@ -180,13 +181,15 @@ class JobRunner(JobRecords):
     def _recover_job(self, session: Session, job: Job) -> None:
         """Let an earlier server's job become what it shall, and tell who asked for it of its end."""
         columns = self._build_recovered_columns(job)
+        if columns["state"] not in OPEN:
+            columns["ended"] = find_end_time(session)
         update_job(session, job.id, **columns)
         notify_of_end(session, replace(job, state=columns["state"]))
 
     def _build_recovered_columns(self, job: Job) -> dict[str, Any]:
         """What an earlier server's job becomes."""
         if job.ending:
-            return {"state": CANCELLED, "ended": now(), "sentence": "Cancelled."}
+            return {"state": CANCELLED, "sentence": "Cancelled."}
         if self._is_resumable(job):
             return {"state": WAITING, "started": None, "sentence": "Started again."}
         sentence = "The server stopped before this was done. Start it again."
@@ -195,7 +198,7 @@ class JobRunner(JobRecords):
                 f"The server crashed {job.tries} times during this job, so it is not started again."
             )
         problem = {"detail": sentence, "hint": None, "pointer": None}
-        return {"state": FAILED, "ended": now(), "sentence": sentence, "problem": problem}
+        return {"state": FAILED, "sentence": sentence, "problem": problem}
 
     def _is_resumable(self, job: Job) -> bool:
         return job.kind in self._resumers and job.tries < MOST_TRIES and not job.ending
@@ -224,14 +227,28 @@ class JobRunner(JobRecords):
                 continue
             try:
                 self._execute_run(run)
+            except StorageError as error:
+                log.warning(
+                    "the start of a job could not be written", job=run.job.id, error=str(error)
+                )
+                self._leave_queue(run, again=not (run.counted or run.progress.is_stopping))
+                self._closing.wait(1.0)
             except Exception:
                 log.exception("the record of a job could not be written", job=run.job.id)
-            finally:
-                with self._changed:
-                    self._queue = self._queue.without_run(run)
-                    # What was of its dataset may run beside another now.
-                    self._changed.notify_all()
-                run.over.set()
+                self._leave_queue(run)
+            else:
+                self._leave_queue(run)
+
+    def _leave_queue(self, run: JobRun, *, again: bool = False) -> None:
+        """Let a job that ran be over; ``again``: it did not begin, and waits as before."""
+        with self._changed:
+            self._queue = self._queue.without_run(run)
+            if again:
+                self._queue = self._queue.with_waiting_runs(run)
+            # What was of its dataset may run beside another now.
+            self._changed.notify_all()
+        if not again:
+            run.over.set()
 
     def _wait_for_next_run(self, ready: Callable[[], list[JobRun]]) -> JobRun | None:
         """The next job to run, of those that may; None when the server stops, or none came for a
@@ -285,7 +302,7 @@ class JobRunner(JobRecords):
 
     def _record_end(self, run: JobRun, by: str | None = None, **values: Any) -> Job | None:
         """Save how a job ended; ``by``: see ``cancel``. None where it cannot be written yet."""
-        columns, job = {**run.columns, "ended": now(), **values}, None
+        columns, job = {**run.columns, **values}, None
         # Where the disk is full for a moment, the record waits for it.
         for _ in range(END_TRIES):
             try:

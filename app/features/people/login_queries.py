@@ -23,6 +23,7 @@ from sqlalchemy.orm import Mapped, mapped_column
 from app.db.dialects.dialect import insert as insert_or_update
 from app.db.session import Base, Session
 from app.features.datasets.tables import DatasetModel
+from app.features.groups.insert_queries import find_next_row_id, reserve_row_ids
 from app.features.people.queries import MUST_ENROL, select_with_rights
 from app.features.people.tables import (
     AccessTokenModel,
@@ -316,8 +317,9 @@ _ALL_TOKENS = (
 
 def insert_access_token(session: Session, values: dict[str, Any]) -> int:
     """Insert a token; returns its id."""
-    done = session.execute(insert(AccessTokenModel).returning(AccessTokenModel.id), values)
-    return int(done.scalar_one())
+    identity = find_next_row_id(session, AccessTokenModel)
+    session.execute(insert(AccessTokenModel), [{"id": identity, **values}])
+    return identity
 
 
 def find_access_token(
@@ -360,16 +362,19 @@ def update_access_token_last_use(session: Session, token_id: int, at: str) -> No
 
 def delete_access_token(session: Session, token_id: int) -> None:
     """End a token."""
+    reserve_row_ids(session, AccessTokenModel)
     session.execute(delete(AccessTokenModel).where(AccessTokenModel.id == token_id))
 
 
 def delete_access_tokens(session: Session, person_id: int) -> None:
     """End every token of a person."""
+    reserve_row_ids(session, AccessTokenModel)
     session.execute(delete(AccessTokenModel).where(AccessTokenModel.person_id == person_id))
 
 
 def delete_expired_token(session: Session, person_id: int, name: str, at: str) -> None:
     """Make room for a token of that name, where the one that has it is no longer valid."""
+    reserve_row_ids(session, AccessTokenModel)
     session.execute(
         delete(AccessTokenModel).where(
             AccessTokenModel.person_id == person_id,

@@ -19,7 +19,7 @@ from app.db.json_columns import (
 from app.db.session import Session
 from app.evaluation.prediction_run import PredictedTrack
 from app.features.datasets.tables import DatasetModel, ViewModel
-from app.features.groups.insert_queries import find_next_row_id
+from app.features.groups.insert_queries import find_next_row_id, reserve_row_ids
 from app.features.people.visibility_queries import list_columns_with_shown_actor
 from app.features.predictions.tables import (
     EvaluationFrameModel,
@@ -160,6 +160,7 @@ def insert_prediction_set(
 
 def delete_prediction_set(session: Session, set_id: int) -> None:
     """Delete a set with everything that belongs to it; nothing where there is none."""
+    reserve_row_ids(session, PredictionSetModel)
     session.execute(delete(PredictionSetModel).where(PredictionSetModel.id == set_id))
 
 
@@ -298,6 +299,7 @@ def insert_evaluation(
 
 def delete_evaluation(session: Session, evaluation_id: int) -> None:
     """Delete a run with its frames; nothing where there is none."""
+    reserve_row_ids(session, EvaluationModel)
     session.execute(delete(EvaluationModel).where(EvaluationModel.id == evaluation_id))
 
 

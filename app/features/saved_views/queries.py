@@ -8,7 +8,7 @@ from sqlalchemy import ForeignKey, UniqueConstraint, delete, insert, select
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.session import Base, Session, now
-from app.features.groups.insert_queries import find_next_row_id
+from app.features.groups.insert_queries import find_next_row_id, reserve_row_ids
 from app.features.people.visibility_queries import shown_actor_column
 
 
@@ -53,4 +53,5 @@ def insert_saved_view(session: Session, dataset_id: int, *, actor: str, **values
 
 def delete_saved_view(session: Session, view_id: int) -> None:
     """Delete a saved view; nothing where there is none."""
+    reserve_row_ids(session, SavedViewModel)
     session.execute(delete(SavedViewModel).where(SavedViewModel.id == view_id))

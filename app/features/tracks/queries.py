@@ -11,7 +11,7 @@ from sqlalchemy import Select, delete, insert, select, update
 from app.db.json_columns import parse_json_column, translate_shape_errors_to_damage
 from app.db.session import Session
 from app.features.datasets.tables import DatasetModel, GroupModel
-from app.features.groups.insert_queries import find_next_row_id
+from app.features.groups.insert_queries import find_next_row_id, reserve_row_ids
 from app.features.queue.tables import QueueModel
 from app.features.recordings.tables import BallRunModel, RecordingModel
 from app.features.tracks.tables import TrackModel
@@ -148,6 +148,7 @@ def update_track(session: Session, track_id: int, **values: Any) -> None:
 
 def delete_tracks(session: Session, track_ids: Collection[int]) -> None:
     """Delete tracks."""
+    reserve_row_ids(session, TrackModel)
     session.execute(delete(TrackModel).where(TrackModel.id.in_(list(track_ids))))
 
 

@@ -16,6 +16,7 @@ from app.db.log import AUDIT_KINDS, LogModel
 from app.db.session import Session, now
 from app.features.batches.queries import count_work, find_batch, list_batch_people
 from app.features.datasets.queries import read_dataset_name
+from app.features.groups.insert_queries import find_next_row_id, reserve_row_ids
 from app.features.jobs.queries import JobModel
 from app.features.webhooks.tables import DeliveryModel, WebhookModel
 from app.json_text import canonical_json_text
@@ -71,8 +72,9 @@ def insert_webhook(
     session: Session, dataset_id: int, url: str, kinds: Iterable[str], *, salt: str, by: str
 ) -> int:
     """Insert a webhook, which is told what happens from now on; returns its id."""
-    at = now()
+    at, identity = now(), find_next_row_id(session, WebhookModel)
     values = {
+        "id": identity,
         "dataset_id": dataset_id,
         "url": url,
         "kinds": canonical_json_text(sorted(kinds)),
@@ -83,8 +85,8 @@ def insert_webhook(
         "jobs_until": at,
         "job_id": 0,
     }
-    done = session.execute(insert(WebhookModel).returning(WebhookModel.id), values)
-    return int(done.scalar_one())
+    session.execute(insert(WebhookModel).values(values))
+    return identity
 
 
 def update_webhook(session: Session, webhook_id: int, values: dict[str, Any]) -> None:
@@ -94,6 +96,7 @@ def update_webhook(session: Session, webhook_id: int, values: dict[str, Any]) ->
 
 def delete_webhook(session: Session, webhook_id: int) -> None:
     """Delete a webhook with all that it was told."""
+    reserve_row_ids(session, WebhookModel)
     session.execute(delete(WebhookModel).where(WebhookModel.id == webhook_id))
 
 

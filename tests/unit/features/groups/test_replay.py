@@ -1,12 +1,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import pytest
-from sqlalchemy import Table, func, insert, select, text
+from sqlalchemy import Table, insert, select, text
 
-from app.db.session import Session
 from app.db.store import Store
 from app.errors import StorageError
 from app.features.datasets.tables import GroupModel, ImportFindingModel, StationModel, ViewModel
@@ -29,6 +27,7 @@ from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImagePoint
 from app.soccer.policy import STRICT
 from tests.databases import said_for_sqlite
+from tests.unit.stores import insert_row
 
 
 @pytest.fixture
@@ -143,7 +142,7 @@ class TestRebuild:
     ) -> None:
         ids = fill(make_group(7), make_group(8))
         with store.write() as session:
-            tables = [_insert_row(session, table) for table in _list_cascading_tables()]
+            tables = [insert_row(session, table) for table in _list_cascading_tables()]
             said = [{"group_id": ids[0], "kind": kind, "sentence": kind} for kind in SEEN]
             session.execute(insert(ImportFindingModel), said)
         assert {"take", "gold", "lease", "agreement", "batch_group", "prediction"} < set(tables)
@@ -157,7 +156,7 @@ class TestRebuild:
         ids = fill(make_group(7), make_group(8))
         with store.write() as session:
             for table in _list_cascading_tables():
-                _insert_row(session, table)
+                insert_row(session, table)
             said = {"group_id": ids[0], "view": "none.png", "kind": SEEN[0], "sentence": "odd"}
             session.execute(insert(ImportFindingModel), [said])
             stations, groups, views = (
@@ -192,22 +191,6 @@ def _list_cascading_tables() -> list[Table]:
             for key in table.foreign_keys
         )
     ]
-
-
-def _insert_row(session: Session, table: Table) -> str:
-    """A row of the table that refers to the first rows of others, which are made where there are none."""
-    values: dict[str, Any] = {}
-    for column in table.columns:
-        for key in column.foreign_keys:
-            first = select(func.min(key.column))
-            if session.scalar(first) is None:
-                _insert_row(session, key.column.table)
-            values[column.key] = session.scalar(first)
-        if not column.foreign_keys and not column.nullable:
-            made = {int: 1, str: "x", bytes: b"x", float: 1.0, bool: False}
-            values[column.key] = made[column.type.python_type]
-    session.execute(insert(table), [values])
-    return table.name
 
 
 def _read_all_rows(store: Store) -> dict[str, list[str]]:

@@ -24,7 +24,7 @@ from app.errors import (
 )
 from app.features.imports.ingest import ensure_dataset
 from app.features.jobs import runner as module
-from app.features.jobs.job_run import JobProgress
+from app.features.jobs.job_run import JobProgress, JobRun
 from app.features.jobs.queries import Job, NewJob, insert_job, update_job
 from app.features.jobs.service import Jobs
 from app.features.people.roles import Role
@@ -182,6 +182,42 @@ class TestSubmitting:
             submit(jobs, lambda _: began.append(1), then=then)
         assert jobs.wait(submit(jobs, lambda _: 7).id, SECONDS).result == 7
         assert (began, len(jobs.find())) == ([], 2)
+
+
+class TestStart:
+    def test_that_cannot_be_written_is_tried_again(
+        self, jobs: Jobs, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        whole, refused = jobs._record_start, []
+
+        def refuse_once(run: JobRun) -> bool:
+            if not refused:
+                refused.append(run)
+                raise StorageError("another process is writing")
+            return whole(run)
+
+        monkeypatch.setattr(jobs, "_record_start", refuse_once)
+        job = submit(jobs, lambda _: 7)
+        until(lambda: refused)
+        assert jobs.get(job.id).state == "waiting"
+        assert not jobs.is_idle()
+        assert jobs.wait(job.id, SECONDS).result == 7
+        until(jobs.is_idle)
+
+    def test_that_cannot_be_written_is_left_to_the_next_server(
+        self, store: Store, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        jobs = Jobs(store)
+
+        def refuse(_run: JobRun) -> bool:
+            jobs.stop()
+            raise StorageError("another process is writing")
+
+        monkeypatch.setattr(jobs, "_record_start", refuse)
+        job = submit(jobs, lambda _: 7)
+        until(jobs.is_idle)
+        jobs.close()
+        assert jobs.get(job.id).state == "waiting"
 
 
 class TestProgress:

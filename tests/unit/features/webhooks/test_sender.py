@@ -10,6 +10,7 @@ import pytest
 from sqlalchemy import text
 
 from app.db.home import WEBHOOKS
+from app.db.session import format_utc_time
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
 from app.features.datasets.service import delete_dataset
@@ -17,6 +18,7 @@ from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.submit import submit_edit
 from app.features.groups.undo import undo_group_edit
 from app.features.jobs.queries import NewJob, insert_job, update_job
+from app.features.jobs.service import Jobs
 from app.features.maintenance.upkeep import delete_old_deliveries
 from app.features.people.roles import Role
 from app.features.people.service import change_person, find_person, give_role, invite
@@ -139,6 +141,25 @@ class TestTelling:
         sender.queue_new_messages()
         sender.send_due_messages()
         assert receiver.kinds == [MessageKind.JOB_DONE]
+
+    def test_an_end_that_is_written_late_or_by_an_earlier_clock_is_told(
+        self, allowed, receiver, sender, hook, state, monkeypatch
+    ) -> None:
+        jobs = Jobs(allowed)
+        with allowed.write() as session:
+            number = session.execute(text("SELECT id FROM dataset")).scalar_one()
+            ids = [insert_job(session, NewJob("export", "COCO", "ann", number)) for _ in range(3)]
+        hour = datetime.now(UTC) + timedelta(hours=1)
+        with monkeypatch.context() as patch:
+            patch.setattr("app.features.jobs.queries.now", lambda: format_utc_time(hour))
+            jobs._save_end(ids[2], state="done")
+        sender.queue_new_messages()
+        for job in ids[:2]:
+            jobs._save_end(job, state="failed")
+            sender.queue_new_messages()
+        sender.send_due_messages()
+        told = [body["data"]["job"]["id"] for _, body in receiver.got if "job" in body["data"]]
+        assert told == [ids[2], ids[0], ids[1]]
 
     def test_a_sender_that_died_before_it_sent_is_followed_by_one_that_does(
         self, allowed, sender, receiver, hook, state, clock
