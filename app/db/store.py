@@ -205,7 +205,8 @@ class Store:
                 self._file.require_write_ahead_log()
             if lasting:
                 self.sharing.publish(session, COMMITTED)
-            session.commit()
+            with translate_storage_errors(self.settings, committing=True):
+                session.commit()
             self._refused = None
             self._save_anchor(session)
         self.notify_listeners()

@@ -266,15 +266,22 @@ def make_engine(settings: Settings, *, lasting: bool = True) -> Engine:
 
 
 @contextmanager
-def translate_storage_errors(settings: Settings) -> Iterator[None]:
+def translate_storage_errors(settings: Settings, *, committing: bool = False) -> Iterator[None]:
     """Turn what the disk or the database refuses into a ``StorageError`` with a sentence.
 
-    A text that no database of its kind can hold is the caller's: an ``InputError``.
+    A text that no database of its kind can hold is the caller's: an ``InputError``. ``committing``: the
+    database may have kept a change before it could no longer be reached.
     """
     try:
         yield
     except DBAPIError as error:
         kind, name = get_dialect(settings).failure(error)
+        if committing and kind is DatabaseFailure.AWAY:
+            raise StorageError(
+                f"the connection to {settings.database_name} was lost while a change was being saved:"
+                " it is not known whether it was",
+                hint="Load the current state, and make the change again if it is not there.",
+            ) from error
         if kind is DatabaseFailure.TEXT:
             raise unstorable_text_error() from error
         if kind is not DatabaseFailure.OTHER or isinstance(error, OperationalError):

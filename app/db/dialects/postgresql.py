@@ -157,6 +157,11 @@ MIN_SERVER = 15
 """The oldest major version that the tests have seen."""
 WRITE_LOCK = 0x746F756368
 """The advisory lock of the one writer; it is the database's, and ends with its transaction."""
+KEEPALIVE = {"idle": 15, "interval": 5, "count": 3}
+"""Seconds of silence, seconds between questions, and how many stay without an answer, until either end of a
+connection takes the other for gone, with the write lock or the claims that it holds."""
+GONE_SECONDS = 30
+"""The same for what was sent and that nobody says has arrived."""
 LOCK_SECONDS = 5
 """How long a writer waits for others, and a migration for a table."""
 LOOK_SECONDS = 0.2
@@ -326,13 +331,16 @@ DIALECT = PostgreSQLDialect()
 
 
 def _parse_psycopg_url(url: str) -> URL:
-    """The URL for psycopg.
+    """The URL for psycopg, with the promises of ``KEEPALIVE`` where it has none of its own.
 
     Raises:
         InputError: It is none; what it says is not repeated, for it holds a password.
     """
     try:
-        return make_url(url).set(drivername="postgresql+psycopg")
+        parsed = make_url(url).set(drivername="postgresql+psycopg")
+        promised = {f"keepalives_{name}": str(number) for name, number in KEEPALIVE.items()}
+        promised["tcp_user_timeout"] = str(GONE_SECONDS * 1000)
+        return parsed.set(query={**promised, **parsed.query})
     except (ArgumentError, ValueError) as error:
         # Without its cause, which repeats what it was given.
         del error
@@ -358,6 +366,10 @@ def _set_up_connection(lasting: bool, connection: Any, _record: object) -> None:
     connection.execute(f"SET synchronous_commit = {'on' if lasting else 'off'}")
     connection.execute(f"SET lock_timeout = '{LOCK_SECONDS}s'")
     connection.execute("SET TIME ZONE 'UTC'")
+    # For the server's end of the connection; the URL says it for this one.
+    for name, number in KEEPALIVE.items():
+        connection.execute(f"SET tcp_keepalives_{name} = {number}")
+    connection.execute(f"SET tcp_user_timeout = '{GONE_SECONDS}s'")
     connection.autocommit = was
 
 

@@ -116,9 +116,6 @@ class PostgreSQLCoordinator:
         try:
             if self._claiming is None:
                 self._claiming = self._engine.connect()
-                # A machine that vanished lets go of its claims within half a minute.
-                for setting in ("idle = 15", "interval = 5", "count = 3"):
-                    self._claiming.execute(text(f"SET tcp_keepalives_{setting}"))
             return self._claiming.execute(text(statement), {"key": _hash_lock_name(name)}).scalar()
         except DBAPIError:
             self._close_claiming_connection()

@@ -66,6 +66,40 @@ class TestConnections:
             assert not driver.closed
         assert driver.closed
 
+    @pytest.mark.parametrize("lasting", [True, False])
+    def test_each_ends_soon_after_the_machine_at_its_other_end_has_vanished(
+        self, own_store: Store, lasting: bool
+    ) -> None:
+        names = ("keepalives_idle", "keepalives_interval", "keepalives_count", "user_timeout")
+        with own_store.write(lasting=lasting) as session:
+            # Behind a socket of this machine a server shows none of them, but who has set them.
+            source = text("SELECT source FROM pg_settings WHERE name = :name")
+            for name in names:
+                assert session.scalar(source, {"name": f"tcp_{name}"}) == "session"
+            driver: Any = session.connection.driver_connection
+            own = driver.info.get_parameters()
+        assert (own["keepalives_idle"], own["tcp_user_timeout"]) == ("15", "30000")
+
+    @pytest.mark.parametrize(
+        ("again", "said"),
+        [(False, "Load the current state"), (True, "Nothing was saved")],
+        ids=["while a change is saved", "before"],
+    )
+    def test_one_that_is_lost_says_what_is_known_of_the_change(
+        self, own_store: Store, again: bool, said: str
+    ) -> None:
+        # What need not last tells nobody: nothing stands between its statements and its commit.
+        with pytest.raises(StorageError) as refused, own_store.write(lasting=False) as session:
+            add = text(INSERT.format("a"))
+            session.execute(add)
+            pid = session.scalar(text("SELECT pg_backend_pid()"))
+            with own_store.read_for_one_statement() as other:
+                other.execute(text("SELECT pg_terminate_backend(:pid, 10000)"), {"pid": pid})
+            if again:
+                session.execute(add)
+        assert said in (refused.value.hint or "")
+        assert ("it is not known whether" in refused.value.message) is not again
+
 
 class TestWrite:
     def test_one_at_a_time_and_who_waits_too_long_is_told(
