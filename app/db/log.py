@@ -22,7 +22,7 @@ from sqlalchemy import (
 from sqlalchemy.orm import Mapped, mapped_column
 from zlib_ng import zlib_ng
 
-from app.db.dialects.dialect import get_session_dialect
+from app.db.dialects.dialect import get_session_dialect, select_from_number_list
 from app.db.json_columns import Json, decompress, decompress_json
 from app.db.session import Base, Session
 from app.errors import DamagedError
@@ -192,7 +192,8 @@ def iterate_group_entries_of_kinds(
     session: Session, group_ids: Sequence[int], kinds: Iterable[str]
 ) -> Iterator[LogEntry]:
     """Entries of some kinds about groups, oldest first."""
-    return read_log(session, LogModel.group_id.in_(group_ids), LogModel.kind.in_(list(kinds)))
+    mine = LogModel.group_id.in_(select_from_number_list(group_ids))
+    return read_log(session, mine, LogModel.kind.in_(list(kinds)))
 
 
 def iterate_entries_of_kinds(session: Session, kinds: Iterable[str]) -> Iterator[LogEntry]:
@@ -210,7 +211,7 @@ def filter_groups_with_history(session: Session, group_ids: Sequence[int]) -> se
     """The groups with log entries after their first import, other than verdicts and comments."""
     statement = (
         select(LogModel.group_id)
-        .where(LogModel.group_id.in_(group_ids), _CHANGES)
+        .where(LogModel.group_id.in_(select_from_number_list(group_ids)), _CHANGES)
         .group_by(LogModel.group_id)
         .having(func.count() > 1)
     )

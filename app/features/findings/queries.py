@@ -24,6 +24,7 @@ from sqlalchemy import (
 from sqlalchemy import cast as cast_to
 from sqlalchemy.orm import Mapped, mapped_column
 
+from app.db.dialects.dialect import select_from_number_list
 from app.db.json_columns import parse_json_column, translate_shape_errors_to_damage
 from app.db.log import NewLogEntry, append_entries
 from app.db.session import Base, Session
@@ -107,7 +108,9 @@ def filter_groups_with_finding(session: Session, ids: Collection[int], sentence:
     """The groups among them that have a finding about the whole group."""
     model = ImportFindingModel
     statement = select(model.group_id).where(
-        model.group_id.in_(list(ids)), model.view.is_(None), model.sentence == sentence
+        model.group_id.in_(select_from_number_list(ids)),
+        model.view.is_(None),
+        model.sentence == sentence,
     )
     return {number for number in session.scalars(statement) if number is not None}
 
@@ -178,7 +181,9 @@ def replace_picture_shape_findings(
     fresh = sorted(wanted - present.keys())
     ids = {row.key: row.id for row in session.execute(mine)} if fresh else {}
     if gone:
-        session.execute(delete(model).where(model.id.in_([row.id for row in gone])))
+        session.execute(
+            delete(model).where(model.id.in_(select_from_number_list(row.id for row in gone)))
+        )
     rows = [(ids[group], view, text) for group, view, text in fresh if group in ids]
     add_group_findings(session, PICTURE_GEOMETRY, rows)
     return sorted({row.group_id for row in gone} | {row[0] for row in rows})
@@ -255,7 +260,7 @@ def replace_unexplained_ball_findings(
     }
     gone = [number for key, number in present.items() if key not in wanted]
     if gone:
-        session.execute(delete(model).where(model.id.in_(gone)))
+        session.execute(delete(model).where(model.id.in_(select_from_number_list(gone))))
     names = ("group_id", "view", "sentence", "number", "place", "of_inputs")
     fresh = sorted(wanted - present.keys(), key=lambda key: (key[0], str(key[1])))
     if fresh:

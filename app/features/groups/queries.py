@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from sqlalchemy import BindParameter, bindparam, null, or_, select
 from sqlalchemy.sql import FromClause
 
-from app.db.dialects.dialect import insert
+from app.db.dialects.dialect import insert, select_from_number_list, select_from_text_list
 from app.db.json_columns import decompress_json, parse_json_column, translate_shape_errors_to_damage
 from app.db.session import Session
 from app.errors import NotFoundError
@@ -176,7 +176,13 @@ def find_views(
     statement = (
         select(view.id, view.key, view.group_id, group.key.label("group_key"))
         .join(group, group.id == view.group_id)
-        .where(group.dataset_id == dataset_id, or_(view.id.in_(ids), group.key.in_(groups)))
+        .where(
+            group.dataset_id == dataset_id,
+            or_(
+                view.id.in_(select_from_number_list(ids)),
+                group.key.in_(select_from_text_list(groups)),
+            ),
+        )
         .where(*visible_groups_condition(dataset_id, group.id))
     )
     return session.rows(ViewIdentity, statement)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import bindparam, delete, func, literal, select, update
 
+from app.db.dialects.dialect import select_from_number_list
 from app.db.log import AUDIT_KINDS, LogModel
 from app.db.session import Session
 from app.features.datasets.tables import (
@@ -253,7 +254,7 @@ def refresh_inputs_hashes(session: Session, group_ids: Sequence[int]) -> None:
         )
         .join(ViewModel, ViewModel.group_id == GroupModel.id)
         .join(StationModel, StationModel.id == ViewModel.station_id)
-        .where(GroupModel.id.in_(group_ids))
+        .where(GroupModel.id.in_(select_from_number_list(group_ids)))
         .order_by(GroupModel.id, ViewModel.position)
     )
     heads: dict[int, Any] = {}
@@ -280,7 +281,7 @@ def bump_group_revisions(session: Session, group_ids: Sequence[int], at: str) ->
     """Count a revision of groups that a change of something of theirs made."""
     session.execute(
         update(GroupModel)
-        .where(GroupModel.id.in_(group_ids))
+        .where(GroupModel.id.in_(select_from_number_list(group_ids)))
         .values(revision=GroupModel.revision + 1, changed=at)
     )
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, select, update
 
+from app.db.dialects.dialect import select_from_number_list
 from app.db.json_columns import parse_json_column, translate_shape_errors_to_damage
 from app.db.session import Session
 from app.features.datasets.tables import GroupModel, StationModel, ViewModel
@@ -94,7 +95,7 @@ def list_dataset_views(
         wanted.append(QueueModel.group_id == GroupModel.id)
     where = [GroupModel.dataset_id == dataset_id, *wanted]
     if ids is not None:
-        where.append(ViewModel.id.in_(ids))
+        where.append(ViewModel.id.in_(select_from_number_list(ids)))
     if without_ball:
         where.append(ViewModel.balls == "[]")
     return _read_views(session, *where)

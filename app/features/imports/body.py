@@ -63,6 +63,7 @@ def _group_to_log_json(group: Group) -> Json:
 
 
 GONE = "this group is no longer in the imported files; it is kept until a person rejects it"
+_BATCH = 500
 
 
 def filter_missing_groups_of_read_matches(
@@ -94,7 +95,17 @@ def save_missing_group_findings(
 ) -> int:
     """Save a finding for each group that has none of the kind yet; returns how many."""
     fresh = sorted(set(ids) - filter_groups_with_finding(session, ids, GONE))
-    stored = read_groups(session, fresh)
+    for start in range(0, len(fresh), _BATCH):
+        _save_missing_groups(
+            session, dataset_id, fresh[start : start + _BATCH], source=source, actor=actor
+        )
+    return len(fresh)
+
+
+def _save_missing_groups(
+    session: Session, dataset_id: int, ids: Sequence[int], *, source: str, actor: str
+) -> None:
+    stored = read_groups(session, ids)
     chains = RevisionChains(session, dataset_id).read_chains_by_group_id(stored.values())
     at, entries = now(), []
     for number, item in stored.items():
@@ -104,11 +115,9 @@ def save_missing_group_findings(
             item, base, source, list_group_import_findings(session, number)
         )
         entries.append(NewLogEntry("import", actor, at, body, dataset_id, number))
-    if entries:
-        append_entries(session, entries)
-        add_group_findings(session, KIND, ((number, None, GONE) for number in stored))
-        refresh_queue(session, list(stored))
-    return len(entries)
+    append_entries(session, entries)
+    add_group_findings(session, KIND, ((number, None, GONE) for number in stored))
+    refresh_queue(session, list(stored))
 
 
 def _make_missing_group_entry_body(

@@ -250,7 +250,9 @@ def read_group_proposals(session: Session, group_id: int) -> list[tuple[str, boo
 
 def save_proposals(session: Session, proposals: Sequence[Proposal]) -> None:
     """Put proposals in the place of what their views had; views that are gone are passed over."""
-    ids = select(ViewModel.id).where(ViewModel.id.in_([item.view_id for item in proposals]))
+    ids = select(ViewModel.id).where(
+        ViewModel.id.in_(select_from_number_list(item.view_id for item in proposals))
+    )
     present = set(session.scalars(ids))
     rows = [
         {**asdict(item), "lines": canonical_json_text(lines_to_json(item.lines))}

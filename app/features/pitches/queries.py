@@ -9,7 +9,7 @@ from typing import Any
 from sqlalchemy import ForeignKey, and_, delete, func, insert, select
 from sqlalchemy.orm import Mapped, mapped_column
 
-from app.db.dialects.dialect import insert_or_replace
+from app.db.dialects.dialect import insert_or_replace, select_from_number_list
 from app.db.json_columns import decompress_json, parse_json_column
 from app.db.log import LogEntry, LogModel, read_log
 from app.db.session import Base, Session
@@ -191,7 +191,11 @@ def find_last_pitch_changes(session: Session, dataset_id: int) -> dict[str, LogE
         for entry in read_log(session, LogModel.id.in_(_select_newest_pitch_entries(dataset_id)))
     }
     model = GroupModel
-    rows = session.execute(select(model.id, model.match).where(model.id.in_(entries)))
+    rows = session.execute(
+        select(model.id, model.match).where(
+            model.id.in_(select_from_number_list(key for key in entries if key is not None))
+        )
+    )
     changes = {row.match: entries[row.id] for row in rows}
     return {
         match: entry
@@ -264,5 +268,7 @@ def replace_pitch_findings(
 
 def _group_keys(session: Session, ids: Iterable[int]) -> dict[int, str]:
     model = GroupModel
-    rows = session.execute(select(model.id, model.key).where(model.id.in_(list(ids))))
+    rows = session.execute(
+        select(model.id, model.key).where(model.id.in_(select_from_number_list(ids)))
+    )
     return {row.id: row.key for row in rows}

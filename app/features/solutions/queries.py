@@ -23,7 +23,7 @@ from sqlalchemy import (
 from sqlalchemy.orm import Mapped, mapped_column
 from zlib_ng import zlib_ng
 
-from app.db.dialects.dialect import insert
+from app.db.dialects.dialect import insert, select_from_number_list
 from app.db.json_columns import decompress, parse_json_column, translate_shape_errors_to_damage
 from app.db.session import Base, Session
 from app.errors import ConflictError
@@ -415,7 +415,7 @@ def list_unsolved_groups(
 ) -> list[int]:
     """Ids of a dataset's groups, or of those among some of them, without a solution of this solver
     for their present state, in order."""
-    some = () if among is None else (GroupModel.id.in_(among),)
+    some = () if among is None else (GroupModel.id.in_(select_from_number_list(among)),)
     statement = (
         select(GroupModel.id)
         .join(DatasetModel, DatasetModel.id == GroupModel.dataset_id)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from sqlalchemy import Select, delete, insert, select, update
 
+from app.db.dialects.dialect import select_from_number_list
 from app.db.json_columns import parse_json_column, translate_shape_errors_to_damage
 from app.db.session import Session
 from app.features.datasets.tables import DatasetModel, GroupModel
@@ -127,7 +128,7 @@ def read_track_bodies(session: Session, track_ids: Collection[int]) -> dict[int,
     """The large columns of tracks, by id."""
     model = TrackModel
     statement = select(model.id, model.inputs, model.body, model.patches).where(
-        model.id.in_(list(track_ids))
+        model.id.in_(select_from_number_list(track_ids))
     )
     return {
         row.id: TrackBody(row.inputs, row.body, row.patches) for row in session.execute(statement)
@@ -149,7 +150,7 @@ def update_track(session: Session, track_id: int, **values: Any) -> None:
 def delete_tracks(session: Session, track_ids: Collection[int]) -> None:
     """Delete tracks."""
     reserve_row_ids(session, TrackModel)
-    session.execute(delete(TrackModel).where(TrackModel.id.in_(list(track_ids))))
+    session.execute(delete(TrackModel).where(TrackModel.id.in_(select_from_number_list(track_ids))))
 
 
 def list_group_keys_of_match(session: Session, dataset_id: int, match: str) -> Sequence[Any]:
@@ -205,7 +206,7 @@ def read_groups_by_match(
     if matches is not None:
         statement = statement.where(GroupModel.match.in_(list(matches)))
     if ids is not None:
-        statement = statement.where(GroupModel.id.in_(list(ids)))
+        statement = statement.where(GroupModel.id.in_(select_from_number_list(ids)))
     found: dict[str, list[GroupForTracking]] = {}
     for row in session.execute(statement):
         place = None

@@ -273,6 +273,7 @@ PLAIN = (
     (r"timestamp='.*\n", ""),
     (r"[0-9a-f]{12,}", "#"),
     (r"\b(?:twin|here)\b", "NAME"),
+    (r"\S+/tree\b|\btree\.zip\b", "TREE"),
     (r"\d{4}-\d\d-\d\dT[\d:.+]+", "TIME"),
     (r"anna-\S+ \(token cli\)|\blocal\b", "WHO"),
     (r"(?m)\b((?:\w+_)?id|batch|evaluation)(\W+)\d+(?:\.0)?|^ +\d+(?= )", r"\1\2#"),

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -12,13 +13,26 @@ from sqlalchemy import insert, select, text
 from app.config import Settings
 from app.db.backup import back_up_home
 from app.db.dialects import postgresql
+from app.db.log import filter_groups_with_history, iterate_group_entries_of_kinds
 from app.db.restore import restore_database
+from app.db.session import Session
 from app.db.store import Store
 from app.errors import BusyError, InputError, StorageError
-from app.features.datasets.tables import DatasetModel
+from app.features.datasets.tables import DatasetModel, GroupModel
+from app.features.findings.queries import (
+    PICTURE_GEOMETRY,
+    add_group_findings,
+    filter_groups_with_finding,
+    replace_picture_shape_findings,
+)
+from app.features.groups.queries import find_views
+from app.features.groups.revision_queries import bump_group_revisions, refresh_inputs_hashes
+from app.features.groups.view_queries import list_dataset_views
 from app.features.independent_annotations.tables import CopyDatasetModel
 from app.features.people.queries import DatasetRights, find_rights
 from app.features.people.tables import DatasetRoleModel, PersonModel
+from app.features.solutions.queries import list_unsolved_groups
+from app.features.tracks.queries import delete_tracks, read_groups_by_match, read_track_bodies
 from tests.databases import POSTGRESQL
 from tests.unit.db.homes import say
 
@@ -230,6 +244,41 @@ class TestAddress:
         causes = [error for error in (caught.value, caught.value.__cause__) if error is not None]
         said = [caught.value.hint, repr(settings), *map(repr, causes), *map(str, causes)]
         assert not [one for one in said if "s3cret" in str(one)]
+
+
+MANY = range(1, 65_600)
+"""More than the parameters of one statement."""
+
+
+class TestLongLists:
+    @pytest.mark.parametrize(
+        "ask",
+        [
+            lambda session: refresh_inputs_hashes(session, MANY),
+            lambda session: bump_group_revisions(session, MANY, "t"),
+            lambda session: filter_groups_with_finding(session, MANY, "s"),
+            lambda session: filter_groups_with_history(session, MANY),
+            lambda session: list(iterate_group_entries_of_kinds(session, MANY, ["edit"])),
+            lambda session: list_unsolved_groups(session, 1, MANY),
+            lambda session: find_views(session, 1, MANY, list(map(str, MANY))),
+            lambda session: list_dataset_views(session, 1, ids=MANY),
+            lambda session: read_groups_by_match(session, 1, None, MANY),
+            lambda session: read_track_bodies(session, MANY),
+            lambda session: delete_tracks(session, MANY),
+        ],
+        ids=lambda ask: ask.__code__.co_names[-1],
+    )
+    def test_of_groups_are_one_parameter(
+        self, filled: Store, ask: Callable[[Session], object]
+    ) -> None:
+        with filled.write() as session:
+            ask(session)
+
+    def test_of_findings_that_are_no_more_are_one_parameter(self, filled: Store) -> None:
+        with filled.write() as session:
+            add_group_findings(session, PICTURE_GEOMETRY, ((1, "a", str(n)) for n in MANY))
+            keys = list(session.scalars(select(GroupModel.key)))
+            assert replace_picture_shape_findings(session, 1, keys, []) == [1]
 
 
 class TestCopies:
