@@ -21,6 +21,7 @@ from app.http.route import Route
 
 _UNBUFFERED = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
 """What a proxy between asks for, which would hold events back otherwise."""
+_SEEN = re.compile(r"(\d{1,18})(?:-(\d{1,18}))?", re.ASCII)
 _MOMENT = re.compile(r"(\d{1,18})-(\d{1,18})", re.ASCII)
 
 router = APIRouter(prefix="/events", tags=["events"], route_class=Route)
@@ -70,8 +71,8 @@ class EventStreamStart:
             Header(
                 alias="Last-Event-ID",
                 description=(
-                    "`id` of the last event received: later events are sent first. Anything else "
-                    "is ignored."
+                    "`id` of the last event received: later events are sent first. It may also be the "
+                    "id of a log entry. Anything else is ignored."
                 ),
             ),
         ] = None,
@@ -87,19 +88,19 @@ class EventStreamStart:
         ] = None,
     ):
         self.dataset_id = None if dataset is None else dataset_id(services.store, dataset)
-        newest = self.newest = services.events.read_log_position()
-        seen = last_event_id or ""
-        self.resumed = seen.isascii() and seen.isdigit() and len(seen) < 19 and int(seen) <= newest
-        moment = None if self.resumed else _MOMENT.fullmatch(since or "")
-        known = moment is not None and int(moment[1]) <= newest
-        self.position = (
-            int(seen) if self.resumed else int(moment[1]) if moment and known else newest
-        )
-        self.solution = int(moment[2]) if moment and known else None
+        self.newest, solution = services.events.read_position()
+        seen = _SEEN.fullmatch(last_event_id or "")
+        self.resumed = seen is not None and int(seen[1]) <= self.newest
+        start = seen if self.resumed else _MOMENT.fullmatch(since or "")
+        self.position, self.solution = self.newest, solution
+        if start is not None and int(start[1]) <= self.newest:
+            self.position = int(start[1])
+            self.solution = min(int(start[2] or solution), solution)
         self.numbered = not hides_groups_from_reader()
         if not self.numbered:
             # Whoever is told no id of the log is told all of it that they see.
             self.position, self.solution, self.resumed = 0, 0, False
+        self.id = f"{self.position}-{self.solution}" if self.numbered else "0"
 
 
 async def open_event_feed(
@@ -110,7 +111,13 @@ async def open_event_feed(
 ) -> AsyncIterator[EventListener]:
     """A feed for as long as the request lasts."""
     feed = EventListener(
-        start.dataset_id, start.position, visibility, start.newest, start.numbered, person
+        start.dataset_id,
+        start.position,
+        start.solution,
+        visibility,
+        start.newest,
+        start.numbered,
+        person,
     )
     services.events.subscribe(feed, resumed=start.resumed)
     try:
@@ -123,13 +130,10 @@ def read_current_events(
     services: AppServices,
     visibility: SeesWhole,
     start: Annotated[EventStreamStart, Depends()],
-    feed: Annotated[EventListener, Depends(open_event_feed)],
+    _feed: Annotated[EventListener, Depends(open_event_feed)],
 ) -> list[bytes]:
-    """Jobs that are under way and solutions that arrived, read once the feed hears of later ones."""
-    jobs = services.events.list_open_job_events(start.dataset_id, visibility)
-    if start.solution is None:
-        return jobs
-    return [*services.events.list_solved_events_since(start.solution, feed), *jobs]
+    """Jobs that are under way, read once the feed hears of later ones."""
+    return services.events.list_open_job_events(start.dataset_id, visibility)
 
 
 @router.get("", response_class=Response, responses={**responses(404), **STREAM})
@@ -148,7 +152,7 @@ async def listen_to_events(
     """
 
     async def stream_events() -> AsyncIterator[bytes]:
-        yield b"".join([make_first_event(start.position), *first])
+        yield b"".join([make_first_event(start.id), *first])
         if is_head(request.scope):
             return
         async for events in feed.read():

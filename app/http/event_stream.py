@@ -32,9 +32,7 @@ from app.features.people.visibility_queries import EVERYTHING, Visibility
 from app.features.queue.changes import (
     LoggedChange,
     find_newest_entry_and_solution_ids,
-    read_groups_solved_since,
     read_new_changes,
-    read_newest_entry_id,
 )
 from app.http.documents import encode_document
 from app.http.problem import GroupViewerDocument
@@ -56,7 +54,7 @@ RETRY_MS = 1000
 """How long a browser waits before it comes back."""
 PING_SECONDS = 15.0
 """Between two words to a listener whom there is nothing to tell, lest a proxy thinks it gone."""
-_ID = re.compile(rb"^id: \d+$", re.MULTILINE)
+_ID = re.compile(rb"^id: \d+-\d+$", re.MULTILINE)
 """How an event says its id."""
 
 
@@ -122,8 +120,9 @@ class EventListener:
         dataset_id: Tell of this dataset alone; None: of all.
         position: Id of the log entry up to which it knows everything.
         visibility: What its reader sees.
+        solution: Id of the solution up to which it knows everything.
         began: Id of the newest log entry when it began to listen.
-        numbered: Its events have the ids of their log entries; else they all have 0.
+        numbered: Its events have the ids of log entries and solutions; else they all have 0.
         person: Who listens; None: on a server without accounts.
 
     Attributes:
@@ -136,6 +135,7 @@ class EventListener:
         self,
         dataset_id: int | None,
         position: int,
+        solution: int,
         visibility: Visibility,
         began: int,
         numbered: bool = True,
@@ -143,6 +143,7 @@ class EventListener:
     ):
         self.person = person
         self.dataset_id, self.position, self._numbered = dataset_id, position, numbered
+        self.solution = solution
         self._sight, self._began = visibility, began
         self.lost, self.told = False, monotonic()
         self._events: list[bytes] = []
@@ -191,30 +192,24 @@ class EventPublisher:
         self._lock = threading.Lock()
         self._wake, self._closing = threading.Event(), threading.Event()
         self._thread: threading.Thread | None = None
-        self._solutions = 0
         self._banner: Banner | None = None
         self._counts = ListenerCounts()
         jobs.listen(self._publish_job)
         store.listen(self._wake.set)
         store.sharing.subscribe(self._receive_lease)
 
-    def read_log_position(self) -> int:
-        """Id of the newest entry of the log."""
-        return read_newest_entry_id(self._store)
+    def read_position(self) -> tuple[int, int]:
+        """Ids of the newest entry of the log and of the newest solution."""
+        return find_newest_entry_and_solution_ids(self._store)
 
     def read_resume_token(self) -> str:
         """How things stand, as a page that begins to read them tells the stream later on."""
-        return "-".join(map(str, find_newest_entry_and_solution_ids(self._store)))
+        return "-".join(map(str, self.read_position()))
 
     def read_banner_json(self) -> str:
         """The notice of maintenance as JSON; empty: there is none."""
         banner = read_banner(self._store)
         return "" if banner is None else encode_document(banner).decode()
-
-    def list_solved_events_since(self, solution: int, feed: EventListener) -> list[bytes]:
-        """Solutions that arrived after one, for a listener that has read what was there then."""
-        found = read_groups_solved_since(self._store, solution)
-        return [_change_event(item) for item in found if feed.listens_to_change(item)]
 
     @property
     def counts(self) -> ListenerCounts:
@@ -299,17 +294,23 @@ class EventPublisher:
 
     def _publish_changes(self, feeds: list[EventListener], *, first: bool) -> None:
         """Tell each listener what has happened since it was told last."""
-        places = {feed.position for feed in feeds}
+        places, solutions = {feed.position for feed in feeds}, {feed.solution for feed in feeds}
         self._publish_banner_change(feeds, first=first)
-        news = read_new_changes(self._store, places, None if first else self._solutions)
-        self._solutions = news.solution
+        news = read_new_changes(self._store, places, solutions)
         written = functools.cache(_change_event)
         queued: dict[EventListener, list[bytes]] = {}
         for feed in feeds:
-            wanted = [*news.changes.get(feed.position, []), *news.solved]
-            feed.position = max(feed.position, news.entry)
-            if events := [written(item) for item in wanted if feed.listens_to_change(item)]:
-                queued[feed] = events
+            found = [*news.changes.get(feed.position, []), *news.solved.get(feed.solution, [])]
+            wanted = [item for item in found if feed.listens_to_change(item)]
+            # Who has heard a part of it is told of all solutions again.
+            events = [
+                written(item, None if item.id is None else f"{item.id}-{feed.solution}")
+                for item in wanted[:-1]
+            ]
+            feed.position, feed.solution = max(feed.position, news.entry), news.solution
+            if wanted:
+                last = written(wanted[-1], f"{feed.position}-{feed.solution}")
+                queued[feed] = [*events, last]
         _deliver_events(queued)
 
     def _publish_banner_change(self, feeds: list[EventListener], *, first: bool) -> None:
@@ -363,13 +364,12 @@ def _deliver_events(queued: Mapping[EventListener, list[bytes]], *, ended: bool 
             loop.call_soon_threadsafe(queue_events_on_loop, loop)
 
 
-def make_first_event(position: int) -> bytes:
+def make_first_event(position: str) -> bytes:
     """What a listener gets first: where it stands, should it have to come back."""
-    return format_sse_event(comment="listening", id=str(position), retry=RETRY_MS)
+    return format_sse_event(comment="listening", id=position, retry=RETRY_MS)
 
 
-def _change_event(change: LoggedChange) -> bytes:
-    identity = None if change.id is None else str(change.id)
+def _change_event(change: LoggedChange, identity: str | None) -> bytes:
     if change.group_id is None:
         document = DatasetEvent(dataset=change.dataset, kind=change.kind, actor=change.actor)
         return _format_event("dataset", document, identity)

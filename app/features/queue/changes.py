@@ -59,13 +59,14 @@ class NewChanges:
         entry: Id of the log's last entry; 0 for an empty log.
         solution: Id of the last solution; 0 where there is none.
         changes: By the entry after which they came.
-        solved: Groups that got a solution and are in none of the changes.
+        solved: Groups that got a solution and are in none of the changes, by the solution after which they did;
+            datasets as a whole where they are many.
     """
 
     entry: int
     solution: int
     changes: Mapping[int, list[LoggedChange]]
-    solved: list[LoggedChange]
+    solved: Mapping[int, list[LoggedChange]]
 
 
 def read_newest_entry_id(store: Store) -> int:
@@ -80,25 +81,19 @@ def find_newest_entry_and_solution_ids(store: Store) -> tuple[int, int]:
         return find_newest_entry_id(session), find_newest_solution_id(session)
 
 
-def read_groups_solved_since(store: Store, solution: int) -> list[LoggedChange]:
-    """Groups that got a solution after another one; datasets as a whole where they are many."""
-    with store.read() as session:
-        behind = find_newest_solution_id(session) - solution
-        if behind > FAR:
-            names = read_dataset_names(session)
-            return [LoggedChange(None, key, name, SOLVED, None) for key, name in names.items()]
-        return read_newly_solved_groups(session, solution) if behind > 0 else []
-
-
-def read_new_changes(store: Store, places: Collection[int], solution: int | None) -> NewChanges:
-    """What has changed since some entries of the log, and since a solution (None: none is told)."""
+def read_new_changes(
+    store: Store, places: Collection[int], solutions: Collection[int]
+) -> NewChanges:
+    """What has changed since some entries of the log, and since some solutions."""
     with store.read() as session:
         entry, newest = find_newest_entry_id(session), find_newest_solution_id(session)
         changes = {place: read_changes(session, place) for place in places if place < entry}
-        solved: list[LoggedChange] = []
-        if solution is not None and newest > solution:
-            changed = {item.group_id for items in changes.values() for item in items}
-            solved = read_newly_solved_groups(session, solution, changed)
+        changed = {item.group_id for items in changes.values() for item in items}
+        solved = {
+            solution: read_newly_solved_groups(session, solution, changed)
+            for solution in solutions
+            if solution < newest
+        }
     return NewChanges(entry, newest, changes, solved)
 
 
@@ -114,7 +109,11 @@ def read_changes(session: Session, after: int) -> list[LoggedChange]:
 def read_newly_solved_groups(
     session: Session, after: int, known: Iterable[int | None] = ()
 ) -> list[LoggedChange]:
-    """Groups that got a solution after another one; ``known`` are told of already."""
+    """Groups that got a solution after another one, datasets as a whole where they are many; ``known`` are told
+    of already."""
+    if find_newest_solution_id(session) - after > FAR:
+        names = read_dataset_names(session)
+        return [LoggedChange(None, key, name, SOLVED, None) for key, name in names.items()]
     skipped = set(known)
     found = [
         StoredChange(None, dataset_id, SOLVED, None, group_id)

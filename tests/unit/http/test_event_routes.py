@@ -190,6 +190,30 @@ class TestListen:
             told = {stream.until(lambda name, _: name == "group")["group"] for _ in range(3)}
             assert told == {1, 2, 3}
 
+    def test_a_listener_that_reconnects_is_told_what_was_solved_meanwhile(
+        self, app, served
+    ) -> None:
+        store, (address, _) = app.state.services.store, served
+        with opened(address) as stream:
+            change_policy(store, "broadcast", STRICT, if_match=None, actor="bob")
+            assert stream.next()[0] == "dataset"
+            last = stream.last_id
+        solve_dataset(store, "broadcast")
+        for _ in range(2):
+            with opened(address, {"Last-Event-ID": last}) as stream:
+                told = [stream.until(lambda name, _: name == "group") for _ in range(3)]
+                assert {(one["group"], one["kind"]) for one in told} == {
+                    (number, "solved") for number in (1, 2, 3)
+                }
+                # What was told in part is told again as a whole, and what was told is not.
+                after = stream.last_id
+        with opened(address, {"Last-Event-ID": after}) as stream:
+            change_policy(store, "static", STRICT, if_match=None, actor="bob")
+            assert stream.next()[1]["dataset"] == "static"
+        with opened(address, {"Last-Event-ID": last.partition("-")[0]}) as stream:
+            change_policy(store, "static", PAPER, if_match=None, actor="bob")
+            assert stream.until(lambda name, _: name == "dataset")["dataset"] == "static"
+
     @pytest.mark.parametrize("since", ["", "1", "x-1", "-1-1", "999999-1", "1-" + "9" * 19, "1-٣"])
     def test_a_moment_that_is_none_counts_as_none(self, app, served, since) -> None:
         with opened(served[0], since=since) as stream:
@@ -199,7 +223,7 @@ class TestListen:
     def test_the_last_event_says_more_than_the_moment(self, app, served) -> None:
         store, (address, _) = app.state.services.store, served
         change_policy(store, "static", STRICT, if_match=None, actor="bob")
-        last = str(app.state.services.events.read_log_position())
+        last = str(app.state.services.events.read_position()[0])
         change_policy(store, "broadcast", STRICT, if_match=None, actor="bob")
         with opened(address, {"Last-Event-ID": last}, since="0-0") as stream:
             assert stream.next()[1]["dataset"] == "broadcast"
@@ -247,11 +271,11 @@ class TestListen:
                 change_policy(store, "broadcast", policy, if_match=None, actor="bob")
             heard: list[list[int]] = [[0], [0]]
             for policy in (PAPER, STRICT):
-                newest = app.state.services.events.read_log_position()
+                newest = app.state.services.events.read_position()[0]
                 for one, told in zip((stream, other), heard, strict=True):
                     while told[-1] < newest:
                         one.next()
-                        told.append(int(one.last_id))
+                        told.append(int(one.last_id.partition("-")[0]))
                 change_policy(store, "broadcast", policy, if_match=None, actor="bob")
             assert heard[0] == heard[1] == sorted(set(heard[0]))
 
@@ -268,7 +292,7 @@ class TestListen:
         monkeypatch.setattr(module, "MAX_FEEDS", 1)
         with opened(address):
             # Who is turned away costs the database nothing.
-            monkeypatch.setattr(module, "read_newest_entry_id", None)
+            monkeypatch.setattr(module, "find_newest_entry_and_solution_ids", None)
             refused = httpx.get(f"{address}{EVENTS}", timeout=SECONDS)
             assert (refused.status_code, refused.headers["retry-after"]) == (503, "5")
 
@@ -307,7 +331,7 @@ class TestFeed:
             stream.next()
             seen = stream.last_id
             feed = next(iter(app.state.services.events._feeds))
-            feed.loop.call_soon_threadsafe(feed.take, [module.make_first_event(1)] * 3)
+            feed.loop.call_soon_threadsafe(feed.take, [module.make_first_event("1-1")] * 3)
             with pytest.raises(EOFError):
                 stream.next()
         end = time.monotonic() + SECONDS

@@ -112,8 +112,8 @@ def test_counts_windows_that_listen(app: FastAPI, read, event_loop_of_all: Block
     assert counted() == [0, 0, 0, 0]
 
     async def listen() -> EventListener:
-        position = events.read_log_position()
-        feed = EventListener(None, position, EVERYTHING, position)
+        position, solution = events.read_position()
+        feed = EventListener(None, position, solution, EVERYTHING, position)
         events.subscribe(feed, resumed=True)
         return feed
 

@@ -16,7 +16,7 @@ from app.features.queue import changes as module
 from app.features.queue.changes import (
     LoggedChange,
     read_changes,
-    read_groups_solved_since,
+    read_new_changes,
     read_newly_solved_groups,
 )
 from app.features.solutions.queries import find_newest_solution_id
@@ -140,8 +140,11 @@ class TestReadSolved:
         fill(*(make_group(number) for number in (1, 2, 3)))
         with store.read() as session:
             newest = find_newest_solution_id(session)
-        assert read_groups_solved_since(store, newest) == []
-        assert [one.group_id for one in read_groups_solved_since(store, newest - 3)] == [1, 2, 3]
+        near, far = newest, newest - 3
+        solved = read_new_changes(store, (), (near, far)).solved
+        assert {after: [one.group_id for one in found] for after, found in solved.items()} == {
+            far: [1, 2, 3]
+        }
         monkeypatch.setattr(module, "FAR", 2)
-        (whole,) = read_groups_solved_since(store, newest - 3)
+        (whole,) = read_new_changes(store, (), (near, far)).solved[far]
         assert (whole.dataset, whole.kind, whole.group_id) == ("demo", "solved", None)
