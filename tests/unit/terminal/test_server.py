@@ -41,6 +41,7 @@ from app.json_text import json_text
 from app.log import log_to_stderr
 from app.main import create_app
 from app.soccer.policy import PAPER
+from app.terminal import terminal
 from app.terminal.remote import download_evaluation
 from app.terminal.server import (
     ABLE,
@@ -301,6 +302,8 @@ class TestSame:
     ) -> None:
         """The same is done to one of two equal datasets here, and to the other one there."""
         monkeypatch.chdir(twins)
+        # On a slow machine one of both would tell how far it is.
+        monkeypatch.setattr(terminal, "LINE_SECONDS", float("inf"))
         home = {"TOUCHLINE_HOME": str(place.home)}
 
         for words in SAME:
