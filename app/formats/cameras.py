@@ -28,7 +28,13 @@ from app.formats.file_tree import DEFAULT_LIMITS, FileTree, ImportLimits, Root
 from app.formats.frame_names import map_frame_names_to_owners, normalize_file_name, view_file_path
 from app.formats.json_reader import describe_document, is_camera, read_json, read_json_lines
 from app.formats.report import ReaderReport
-from app.formats.sn_calibration import CAMERAS, LINES, find_original_frame_path, read_match_info
+from app.formats.sn_calibration import (
+    CAMERAS,
+    LINES,
+    NO_FRAMES,
+    find_original_frame_path,
+    read_match_info,
+)
 from app.formats.synloc import camera_from_synloc, index_image_records, is_synloc_image_record
 from app.formats.trees import open_tree_context
 from app.formats.view_files import PutText, make_disk_writer
@@ -42,10 +48,6 @@ _ENDINGS = ".json, .jsonl, .npz, .yml"
 _IMAGE = re.compile(r"\.(?:png|jpe?g|webp|bmp|tiff?)", re.ASCII | re.IGNORECASE)
 _ABSOLUTE = re.compile(r"/|[A-Za-z]:/")
 
-_NO_CAMERAS = (
-    "manifest.json", "match_info.json", "findings.json", "calibrate.json", "leave_one_out.json",
-    "propose.json", "snap.json",
-)  # fmt: skip
 _WRAPPERS = (
     "cam_params",
     "camera",
@@ -159,7 +161,7 @@ def _select_camera_files(names: Iterable[str]) -> list[str]:
     """Camera files; where none is called ``camera_...``, every file of such an ending may be one."""
     names = [name for name in names if _FILE.fullmatch(PurePosixPath(name).name)]
     named = [name for name in names if PurePosixPath(name).name.startswith("camera_")]
-    return named or [name for name in names if PurePosixPath(name).name not in _NO_CAMERAS]
+    return named or [name for name in names if PurePosixPath(name).name not in NO_FRAMES]
 
 
 def _camera_key(name: str, deep: bool) -> str:

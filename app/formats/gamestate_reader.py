@@ -18,7 +18,7 @@ from app.formats.report import ReaderReport
 from app.formats.safe_path import require_safe_path
 from app.formats.sn_calibration_reader import lines_from_json
 from app.formats.soccernet_v3 import SPLITS
-from app.formats.split_names import parse_split_name, split_in_file_name
+from app.formats.split_names import parse_split_name, read_split_name, split_in_file_name
 from app.formats.trees import open_tree_context
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import MAX_SIDE, Box, ImageSize
@@ -31,6 +31,10 @@ BALL, PITCH = "ball", "pitch"
 BALL_ID, PITCH_ID = 4, 5
 """Ids of the categories where a file does not list them."""
 CAMERA_ID = 6
+OCCLUDED = "occluded"
+"""Ours, beside the box of a ball that somebody hides."""
+SPLIT = "touchline_split"
+"""Ours, in ``info``: a split that is called as no folder of an evaluator is."""
 IMAGES = "img1"
 """Folder of the frames of a sequence."""
 SEQUENCE = "sequence"
@@ -154,7 +158,12 @@ class _LabelledSequence:
         self._inside = list_files_in_folder(names, self._folder)
         self.key = self._sequence_key()
         parts = PurePosixPath(name).parts
-        self.split = _find_split_in_folders(parts)
+        self.split = self._read_own_split() or _find_split_in_folders(parts)
+
+    def _read_own_split(self) -> str:
+        info = self._value.get("info")
+        said = info.get(SPLIT) if isinstance(info, dict) else None
+        return read_split_name(said, self._report) if isinstance(said, str) else ""
 
     def _sequence_key(self) -> str:
         folders = PurePosixPath(self._folder).parts
@@ -340,9 +349,10 @@ def read_ball_annotation(item: Mapping[str, Any]) -> BallAnnotation:
     box = _read_bbox_image(item)
     if box.width < 0 or box.height < 0:
         raise ValueError("has a negative width or height")
+    occluded = item.get(OCCLUDED) is True
     if box.width == 0 or box.height == 0:
-        return BallAnnotation(point=box.center)
-    return BallAnnotation(box=box)
+        return BallAnnotation(point=box.center, occluded=occluded)
+    return BallAnnotation(box=box, occluded=occluded)
 
 
 def _make_person_box(item: Mapping[str, Any]) -> Mapping[str, Any]:

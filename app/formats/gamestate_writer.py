@@ -24,7 +24,9 @@ from app.formats.gamestate_reader import (
     IMAGES,
     LABELS,
     METADATA,
+    OCCLUDED,
     PITCH_ID,
+    SPLIT,
     frame_file_name,
     get_gamestate_metadata,
     read_ball_annotation,
@@ -32,6 +34,7 @@ from app.formats.gamestate_reader import (
 )
 from app.formats.safe_path import resolve_inside
 from app.formats.sn_calibration_writer import lines_to_json
+from app.formats.soccernet_v3 import SPLITS
 from app.geometry.camera import Camera
 from app.json_text import json_text
 from app.soccer.annotation import CORNERS, BallAnnotation
@@ -95,12 +98,14 @@ class _LabelsFile:
 
     def _make_sequence_info(self) -> dict[str, Any]:
         kept, length = self.kept.get("info"), len(self.images)
+        own = {SPLIT: self.split} if self.split and self.split not in SPLITS else {}
         if not kept:
             info = {"version": "1.3", "id": str(self.number), "name": self.name, "im_dir": IMAGES}
-            return {**info, "seq_length": length}
+            return {**info, "seq_length": length, **own}
+        info = {name: value for name, value in kept.items() if name != SPLIT} | own
         # Some of its images may not be in this export.
         is_stale = "seq_length" in kept and str(kept["seq_length"]) != str(length)
-        return {**kept, "seq_length": length} if is_stale else dict(kept)
+        return {**info, "seq_length": length} if is_stale else info
 
     def next_image_id(self) -> str:
         """Id of the next image; no sequence of an export has the same."""
@@ -331,17 +336,20 @@ def _make_ball_annotations(
         nearest, box = rest[index : index + 1], _make_bbox_of_ball(ball)
         kept = next((item for item in nearest + rest if _is_ball_as_it_came(item, ball)), None)
         if kept is not None:
-            yield {**_BALL, **kept, BOX: {**box, **kept[BOX]}}
+            made = {**_BALL, **kept, BOX: {**box, **kept[BOX]}}
         elif nearest and BOX not in nearest[0]:
             # Read before its box was kept with it.
-            yield {**_BALL, **nearest[0], BOX: box}
+            made = {**_BALL, **nearest[0], BOX: box}
         else:
             # Drawn here, or moved: then it is the same ball at another place.
             kept = (
                 nearest[0] if nearest else {"track_id": file.assign_track_number(("ball", index))}
             )
             place = _locate_spot_below_ball(record, view)
-            yield {**_BALL, **kept, "bbox_pitch": place, BOX: box}
+            made = {**_BALL, **kept, "bbox_pitch": place, BOX: box}
+        if ball.occluded or made.get(OCCLUDED) is True:
+            made[OCCLUDED] = ball.occluded
+        yield made
 
 
 def _is_ball_as_it_came(item: Mapping[str, Any], ball: BallAnnotation) -> bool:

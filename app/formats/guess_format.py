@@ -32,7 +32,7 @@ _NAMES: tuple[tuple[str, re.Pattern[str]], ...] = (
     ("issia", re.compile(r"(?:.*\.xgtf|cam.*\.xml)(?:\.gz)?", re.IGNORECASE)),
     ("parquet", re.compile(r".*\.parquet", re.IGNORECASE)),
     ("coco", re.compile(r"(?:instances_|annotations|(?=.*coco)).*\.json")),
-    ("sn-calibration", re.compile(r"(?:\d{1,9}|match_info)\.json")),
+    ("sn-calibration", re.compile(r"(?:\d{1,9}|(?:per_)?match_info)\.json")),
     ("cameras", re.compile(r"(?:camera_.*|issia_calibration)\.json")),
 )
 """By the last part of a name; the first one that any fits: exports hold cameras beside labels."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -34,7 +34,7 @@ from app.soccer.pitch import WITHOUT_GEOMETRY, find_marking_like
 DEFAULT_SIZE = ImageSize(960, 540)
 LINES, CAMERAS = "lines", "cameras"
 """Folders of an export: the public evaluator takes every JSON beside the lines for a frame."""
-_FOLDER = re.compile(rf"({'|'.join((*SPLITS, UNASSIGNED))})-(\d{{1,5}})x(\d{{1,5}})", re.ASCII)
+_FOLDER = re.compile(r"(.+)-(\d{1,5})x(\d{1,5})", re.ASCII)
 _PLAIN = re.compile(r"[A-Za-z0-9_-]+", re.ASCII)
 LARGEST_UNIT = 2.0
 """A file in which at least half of the points have a coordinate further from 0 is in pixels."""
@@ -71,10 +71,18 @@ def make_split_folder_name(split: str, size: ImageSize) -> str:
     return f"{split_in_file_name(split)}-{size.width}x{size.height}"
 
 
-def parse_split_folder_name(folder: str) -> tuple[str, ImageSize] | None:
-    """Back from ``make_split_folder_name``; None for any other folder."""
+def parse_split_folder_name(folder: str, *, ours: bool = False) -> tuple[str, ImageSize] | None:
+    """Back from ``make_split_folder_name``; None for any other folder.
+
+    Args:
+        folder: Its name alone.
+        ours: Whether ``match_info.json`` says that we wrote it: then its split may be any, as
+            ``fold-3``. People call folders ``clips-1920x1080``, too.
+    """
     found = _FOLDER.fullmatch(folder)
     if found is None or min(int(found[2]), int(found[3])) < 2:
+        return None
+    if not ours and found[1] not in (*SPLITS, UNASSIGNED):
         return None
     split = "" if found[1] == UNASSIGNED else found[1]
     return split, ImageSize(int(found[2]), int(found[3]))
@@ -256,6 +264,13 @@ def _image_stem(name: str) -> str:
 MATCH_INFO = "match_info.json"
 MATCH_INFO_FILES = (MATCH_INFO, "match_info_cam_gt.json")
 """The second one is a third party's, with the kind of camera beside the match."""
+PER_MATCH_INFO = "per_match_info.json"
+"""Beside the other in sets of 2023: ``{match: {image: record}}``."""
+NO_FRAMES = (
+    *MATCH_INFO_FILES, PER_MATCH_INFO, "manifest.json", "findings.json", "calibrate.json",
+    "leave_one_out.json", "propose.json", "snap.json",
+)  # fmt: skip
+"""Files beside those of frames that hold neither lines nor a camera."""
 MATCH_INFO_METADATA = "match_info"
 """Under this name ``Extras.metadata`` keeps the record of an image."""
 MATCH_INFO_PLACE = "touchline_place"
@@ -270,36 +285,54 @@ def read_match_info(
 ) -> Mapping[str, Mapping[str, Any]]:
     """The record of each image, by its path in the tree without the ending.
 
-    An image that two files name has the fields of both.
+    An image that two files name has the fields of both. ``per_match_info.json`` counts for images
+    that no other names.
     """
     found: dict[str, dict[str, Any]] = {}
     for name in names:
         if PurePosixPath(name).name not in MATCH_INFO_FILES:
             continue
-        try:
-            value = read_json(tree.read_bytes(name), tree.shown(name))
-            if not isinstance(value, dict):
-                raise DatasetFormatError(
-                    tree.shown(name), None, None, "is not an object with a record for each image"
-                )
-        except DatasetFormatError as error:
-            report.add_problem(error)
+        for key, record in _read_records_of_images(tree, name, report):
+            found[key] = {**found.get(key, {}), **record}
+    for name in names:
+        if PurePosixPath(name).name == PER_MATCH_INFO:
+            for key, record in _read_records_of_images(tree, name, report):
+                found.setdefault(key, record)
+    return found
+
+
+def _read_records_of_images(
+    tree: FileTree, name: str, report: ReaderReport
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """The records of one file, each with the path of its image without the ending."""
+    shown, folder = tree.shown(name), PurePosixPath(name).parent
+    try:
+        value = read_json(tree.read_bytes(name), shown, report=report)
+        if not isinstance(value, dict):
+            raise DatasetFormatError(
+                shown, None, None, "is not an object with a record for each image"
+            )
+    except DatasetFormatError as error:
+        report.add_problem(error)
+        return
+    matches: dict[str, Any] = {"": value}
+    if PurePosixPath(name).name == PER_MATCH_INFO:
+        matches = value
+    for match, images in matches.items():
+        if not isinstance(images, dict):
+            report.add_problem_at(
+                shown, match[:80], None, "is not an object with a record for each image"
+            )
             continue
-        folder = PurePosixPath(name).parent
-        for image, item in value.items():
+        for image, item in images.items():
             record = {"match": item} if isinstance(item, str) else item
             if not PurePosixPath(image).name:
-                report.add_problem_at(
-                    tree.shown(name), image[:80], None, "is not the name of an image"
-                )
+                report.add_problem_at(shown, image[:80], None, "is not the name of an image")
             elif isinstance(record, dict):
-                key = str((folder / image).with_suffix(""))
-                found[key] = {**found.get(key, {}), **record}
+                own = {"match": match} if match else {}
+                yield str((folder / image).with_suffix("")), {**own, **record}
             else:
-                report.add_problem_at(
-                    tree.shown(name), image[:80], None, "is neither text nor an object"
-                )
-    return found
+                report.add_problem_at(shown, image[:80], None, "is neither text nor an object")
 
 
 def find_original_frame_path(record: Mapping[str, Any]) -> str | None:

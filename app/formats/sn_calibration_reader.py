@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from app.errors import DatasetFormatError, UnknownMarkingError
@@ -16,8 +16,10 @@ from app.formats.frame_names import IMAGE_SUFFIXES
 from app.formats.report import ReaderReport
 from app.formats.sn_calibration import (
     LARGEST_UNIT,
+    MATCH_INFO,
     MATCH_INFO_METADATA,
     MATCH_INFO_PLACE,
+    NO_FRAMES,
     LineDocument,
     LineFile,
     build_match_key_of_record,
@@ -26,7 +28,7 @@ from app.formats.sn_calibration import (
     read_line_documents,
     read_match_info,
 )
-from app.formats.split_names import parse_split_name
+from app.formats.split_names import parse_split_name, read_split_name
 from app.formats.trees import open_tree_context
 from app.soccer.annotation import Extras, Lines, make_lines
 from app.soccer.frames import HALF, ImagePoint, ImageSize
@@ -34,7 +36,6 @@ from app.soccer.group import Group, Station, View
 from app.soccer.pitch import WITHOUT_GEOMETRY, find_marking_like
 from app.wording import plural
 
-_OTHER_FILES = ("manifest.json", "findings.json", "calibrate.json", "leave_one_out.json")
 _OTHER_PREFIXES = ("camera_", "Labels-", "match_info")
 
 
@@ -66,13 +67,12 @@ def read_line_files(
             return
         names = tree.names()
         places = _map_original_frame_paths(read_match_info(tree, names, ReaderReport()))
-        sizes = (
-            _parse_sizes_from_folders(map(_strip_path_suffix, names), path.stem)
-            if by_folder
-            else {}
-        )
-        ours = OwnExportInfo(places, sizes, own_sizes=by_folder)
-        yield from read_line_files_of_tree(tree, names, size, report, ours)
+        sizes: dict[str, ImageSize] = {}
+        if by_folder:
+            ours = {**places, **_map_original_frames_of_export_around(path)}
+            sizes = _parse_sizes_from_folders(map(_strip_path_suffix, names), ours, path.stem)
+        info = OwnExportInfo(places, sizes, own_sizes=by_folder)
+        yield from read_line_files_of_tree(tree, names, size, report, info)
 
 
 @dataclass(frozen=True)
@@ -142,9 +142,29 @@ def _map_original_frame_paths(infos: Mapping[str, Mapping[str, Any]]) -> dict[st
     }
 
 
-def _parse_sizes_from_folders(places: Iterable[str], top: str = "") -> dict[str, ImageSize]:
+def _map_original_frames_of_export_around(path: Root) -> dict[str, str]:
+    """``_map_original_frame_paths`` of the export that a folder of lines lies in."""
+    found: dict[str, str] = {}
+    if not isinstance(path, Path) or not path.is_dir():
+        return found
+    folder = path.resolve()
+    for around in list(folder.parents)[:2]:
+        if (around / MATCH_INFO).is_file():
+            with open_tree_context(around, ReaderReport(), DEFAULT_LIMITS) as tree:
+                infos = {} if tree is None else read_match_info(tree, [MATCH_INFO], ReaderReport())
+            inside = f"{folder.relative_to(around).as_posix()}/"
+            for whole, place in _map_original_frame_paths(infos).items():
+                if whole.startswith(inside):
+                    found[whole.removeprefix(inside)] = place
+    return found
+
+
+def _parse_sizes_from_folders(
+    places: Iterable[str], ours: Collection[str], top: str = ""
+) -> dict[str, ImageSize]:
     by_folder = {
-        whole: parse_split_folder_name(PurePosixPath(whole).parent.name or top) for whole in places
+        whole: parse_split_folder_name(PurePosixPath(whole).parent.name or top, ours=whole in ours)
+        for whole in places
     }
     return {whole: found[1] for whole, found in by_folder.items() if found}
 
@@ -162,7 +182,7 @@ def _is_line_file(name: str) -> bool:
     last = PurePosixPath(name).name
     if not last.lower().endswith(".json"):
         return False
-    return last not in _OTHER_FILES and not last.startswith(_OTHER_PREFIXES)
+    return last not in NO_FRAMES and not last.startswith(_OTHER_PREFIXES)
 
 
 def _index_images_by_stem(names: Iterable[str]) -> dict[str, str]:
@@ -318,31 +338,35 @@ def read_sn_calibration(
         names = tree.names()
         infos = read_match_info(tree, names, report)
         places = _map_original_frame_paths(infos)
-        ours = OwnExportInfo(places, _parse_sizes_from_folders(places), own_sizes=True)
+        sizes = _parse_sizes_from_folders(places, places)
+        ours = OwnExportInfo(places, sizes, own_sizes=True)
         unused = dict.fromkeys(infos)
         for file in read_line_files_of_tree(tree, names, size, report, ours):
             unused.pop(file.place, None)
-            yield _make_group(file, infos.get(file.place, {}), calibration)
+            yield _make_group(file, infos.get(file.place, {}), calibration, report)
         if unused:
             count = plural(len(unused), "image")
             shown = ", ".join(list(unused)[:5]) + (", ..." if len(unused) > 5 else "")
             report.add_remark(f"{count} of match_info.json without a file of lines: {shown}")
 
 
-def _make_group(file: LineFile, record: Mapping[str, Any], calibration: str) -> Group:
+def _make_group(
+    file: LineFile, record: Mapping[str, Any], calibration: str, report: ReaderReport
+) -> Group:
     info = {name: value for name, value in record.items() if name != MATCH_INFO_PLACE}
     station = Station(file.stem, file.size, lines=file.lines, calibration=calibration)
     extras = Extras(lines=file.others, metadata={MATCH_INFO_METADATA: info} if info else {})
     view = View(file.stem, station, media=file.media, extras=extras)
     match, folders = build_match_key_of_record(info), PurePosixPath(file.place).parts[:-1]
-    splits = (_parse_split_of_folder(folder) for folder in reversed(folders))
-    split = next((split for split in splits if split), "")
+    ours = find_original_frame_path(record) is not None
+    splits = (_parse_split_of_folder(folder, ours) for folder in reversed(folders))
+    split = read_split_name(next((split for split in splits if split), ""), report)
     name = PurePosixPath(file.stem).name
     label = f"{PurePosixPath(match).name} · frame {name}" if match else f"Frame {file.stem}"
     return Group(file.stem, (view,), match=match, split=split, label=label)
 
 
-def _parse_split_of_folder(folder: str) -> str:
+def _parse_split_of_folder(folder: str, ours: bool) -> str:
     """The split that a folder says, or nothing."""
-    named = parse_split_folder_name(folder)
+    named = parse_split_folder_name(folder, ours=ours)
     return named[0] if named else parse_split_name(folder)

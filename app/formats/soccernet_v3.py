@@ -7,6 +7,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -117,6 +118,16 @@ class MatchFrameFinder:
             if folder + image in self._loose:
                 return self._tree.media(self._match + folder + image)
         return None
+
+    @cached_property
+    def _names_by_numbers(self) -> dict[tuple[int, int | None] | None, str]:
+        names = {PurePosixPath(place).name for place in (*self._members, *self._loose)}
+        return {parse_image_numbers(name): name for name in sorted(names, reverse=True)}
+
+    def find_frame_by_numbers(self, image: str) -> Media | None:
+        """The same where a table says no more of a name than its numbers: also ``0007.jpg``."""
+        other = self._names_by_numbers.get(parse_image_numbers(image), image)
+        return self.find_frame(image) or self.find_frame(other)
 
 
 def _is_image_name(name: str) -> bool:

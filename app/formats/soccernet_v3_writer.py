@@ -184,7 +184,8 @@ def write_soccernet_v3d(
     """Write the dataset's files below an existing folder.
 
     ``ball_bbox`` is the annotated box whatever ``boxes`` says, because the optimised one is
-    defined by it: the square of side ``optimized_d`` around its centre. Labels-v3D.json holds the
+    defined by it: the square of side ``optimized_d`` around its centre. Of a ball that is a point
+    it has no area. Labels-v3D.json holds the
     chosen box of the ball in the views that the 3D ball comes from, the annotated one in all
     others. Ball values stand in the rows of views in a valid pair, or in all rows
     with ``everything``, which also adds the column ``verdict``.
@@ -247,10 +248,10 @@ def _list_row_values(record: ExportRecord, view: View, fit: BallFit | None) -> I
     assert numbers is not None, "split_key has checked it"
     action, replay = numbers
     camera = record.camera(view)
-    box = view.ball.box if view.ball else None
+    box = _find_box_or_point(view)
     yield from parse_league_season_match(record.group)
     yield from (action, replay is None, None if replay is None else float(replay))
-    yield from (view.size.width, view.size.height, view.ball is not None)
+    yield from (view.size.width, view.size.height, box is not None)
     yield format_box(box) if box else None
     yield repr(replace_non_finite(camera_to_json(camera))) if camera else None
     yield from _get_view_jac(record, view) or (None,) * len(JAC_NAMES)
@@ -258,6 +259,14 @@ def _list_row_values(record: ExportRecord, view: View, fit: BallFit | None) -> I
     yield from (fit.error_px, fit.optimized_error_m) if fit else (None, None)
     yield fit.optimized_diameter_px if fit else None
     yield record.split_of_view(view) or None
+
+
+def _find_box_or_point(view: View) -> Box | None:
+    """The annotated box of a view's ball; of a point a box without area."""
+    if view.ball is None or view.ball.center is None:
+        return None
+    x, y = view.ball.center
+    return view.ball.box or Box(x, y, 0.0, 0.0)
 
 
 def format_box(box: Box) -> str:

@@ -24,6 +24,7 @@ from app.formats.soccernet_v3 import (
     TABLE,
     MatchFrameFinder,
     group_label,
+    parse_image_numbers,
 )
 from app.formats.soccernet_v3 import LABELS_3D as LABELS
 from app.formats.soccernet_v3_reader import MatchReader
@@ -32,7 +33,7 @@ from app.formats.trees import open_tree_context
 from app.geometry.camera import Camera
 from app.json_text import quote_text
 from app.soccer.annotation import BallAnnotation
-from app.soccer.frames import MAX_SIDE, Box, ImageSize
+from app.soccer.frames import MAX_SIDE, Box, ImagePoint, ImageSize
 from app.soccer.group import Group, Station, View
 from app.wording import plural
 
@@ -49,7 +50,7 @@ class TableRow:
         match: ``<league>/<season>/<match>``.
         action: Number of the action image.
         replay: Number of the replay, or None for the action itself.
-        ball: The annotated box; None where the row has none.
+        ball: The annotated box, or the point of a box without area; None where the row has none.
         camera: None where the row has none.
         split: Empty where the row has none.
     """
@@ -65,12 +66,26 @@ class TableRow:
     @property
     def image(self) -> str:
         """Name of the view's image: ``7_1.png``."""
-        return f"{self.action}.png" if self.replay is None else f"{self.action}_{self.replay}.png"
+        return _make_row_image_name(self.action, self.replay)
 
     @property
     def action_image(self) -> str:
         """Name of the action's image."""
-        return f"{self.action}.png"
+        return _make_row_image_name(self.action, None)
+
+
+def _make_row_image_name(action: int, replay: int | None) -> str:
+    return f"{action}.png" if replay is None else f"{action}_{replay}.png"
+
+
+def _find_row_image_name(image: str) -> str:
+    """What the table calls an image, of which it has the numbers alone: ``7.png`` for ``0007.jpg``."""
+    numbers = parse_image_numbers(image)
+    return image if numbers is None else _make_row_image_name(*numbers)
+
+
+def _find_listed_stem(image: str) -> str:
+    return PurePosixPath(_find_row_image_name(image)).stem
 
 
 @dataclass(frozen=True)
@@ -88,7 +103,7 @@ class SoccerNetV3DTable:
 
     def find_split_of_group(self, match: str, main: str) -> str:
         """Split of a group: as the lists have it, else as its rows do."""
-        folder, stem = PurePosixPath(match).name, PurePosixPath(main).stem
+        folder, stem = PurePosixPath(match).name, _find_listed_stem(main)
         self.asked.add((folder, stem))
         if (folder, stem) in self.lists:
             return self.lists[folder, stem]
@@ -215,6 +230,8 @@ class _TableRowParser:
             return None
         try:
             x, y, width, height = map(fields.parse_pixel_coordinate, parse_number_list(text, 4))
+            if width == height == 0:
+                return BallAnnotation(point=ImagePoint(x, y))
             if width <= 0 or height <= 0:
                 raise ValueError("is a box whose width or height is not positive")
         except ValueError as error:
@@ -277,13 +294,17 @@ def _read_split_list(
             report.add_problem_at(
                 shown, f"line {number}", None, "is not <match>/<action>[_<replay>]"
             )
-        elif found.setdefault((compose_name(PurePosixPath(match).name), stem), split) != split:
+        elif found.setdefault(_make_list_key(match, stem), split) != split:
             report.add_problem_at(
                 shown,
                 f"line {number}",
                 None,
                 "is in the list of another split already; the first one counts",
             )
+
+
+def _make_list_key(match: str, stem: str) -> tuple[str, str]:
+    return compose_name(PurePosixPath(match).name), _find_listed_stem(f"{stem}.png")
 
 
 COMPUTED = (
@@ -343,17 +364,21 @@ class _DatasetReader:
 
     def add_table_to_group(self, group: Group, path: str) -> Group:
         """A group of Labels-v3D.json with its cameras, and what the table knows of it."""
-        main = group.views[0].key
+        main = _find_row_image_name(group.views[0].key)
         self._seen.add((group.match, main))
         rows = self._table.rows.get(group.match, {}).get(main, {})
-        for image in rows.keys() - {view.key for view in group.views}:
+        images = [_find_row_image_name(view.key) for view in group.views]
+        for image in sorted(rows.keys() - set(images)):
             self._report.add_problem_at(
                 path,
                 image,
                 None,
                 f"has a row in {TABLE} and is not in this file; the row is not used",
             )
-        views = tuple(self._add_row_to_view(view, rows.get(view.key), path) for view in group.views)
+        views = tuple(
+            self._add_row_to_view(view, rows.get(image), path)
+            for view, image in zip(group.views, images, strict=True)
+        )
         split = self._table.find_split_of_group(group.match, main) or group.split
         return replace(group, views=views, split=split)
 
@@ -419,7 +444,7 @@ class _DatasetReader:
                 f"{match}/{row.image}", row.size, given=row.camera, calibration=self._calibration
             )
             balls = (row.ball,) if row.ball else ()
-            views.append(View(row.image, station, balls, frames.find_frame(row.image)))
+            views.append(View(row.image, station, balls, frames.find_frame_by_numbers(row.image)))
         return Group(
             key=f"{match}/{main}",
             views=tuple(views),

@@ -350,6 +350,34 @@ class TestWriteWhatWasChanged:
         write(tmp_path, [soccer_group(match="m", split="fold/../1")])
         assert (tmp_path / "fold-..-1/m/Labels-GameState.json").is_file()
 
+    def test_a_split_of_any_name_comes_back_and_a_usual_one_adds_nothing(
+        self, tmp_path: Path, soccer_group: Make, report: ReaderReport
+    ) -> None:
+        write(tmp_path / "a", [soccer_group(split="fold-3")])
+        (first, *_) = again = list(read_gamestate(tmp_path / "a", report))
+        assert {group.split for group in again} == {"fold-3"}
+        write(tmp_path / "b", [replace(group, split="test") for group in again])
+        assert {group.split for group in read_gamestate(tmp_path / "b", report)} == {"test"}
+        assert "touchline_split" not in written(tmp_path / "b")["info"]
+        assert first.views[0].extras.metadata["gamestate"]["info"]["touchline_split"] == "fold-3"
+
+    def test_a_hidden_ball_is_hidden_when_it_comes_back_and_no_more_once_it_is_not(
+        self, tmp_path: Path, soccer_group: Make, report: ReaderReport
+    ) -> None:
+        group = soccer_group(replays=0)
+
+        def round_trip(group: Group, name: str, occluded: bool) -> Group:
+            (view,) = group.views
+            ball = replace(view.balls[0], occluded=occluded)
+            write(tmp_path / name, [group.with_view(replace(view, balls=(ball,)))])
+            (again,) = read_gamestate(tmp_path / name, report)
+            return again
+
+        hidden = round_trip(group, "a", occluded=True)
+        assert hidden.views[0].balls[0].occluded
+        seen = round_trip(hidden, "b", occluded=False)
+        assert not seen.views[0].balls[0].occluded
+
     @pytest.mark.parametrize(
         ("folder", "split"),
         [("Validation/test-12", "valid"), ("val/a", "valid"), ("b/test-12", ""), ("test", "test")],

@@ -38,6 +38,31 @@ class TestReadMatchInfo:
         assert build_match_key_of_record(found["valid/00002"]) == "league/season/match"
         assert [item.record for item in report.problems] == ["00003.jpg"]
 
+    def test_one_number_that_is_none_costs_no_other_image(
+        self, tmp_path: Path, report: ReaderReport
+    ) -> None:
+        text = '{"1.jpg": {"match": "m", "ms_time": NaN}, "2.jpg": {"match": "n"}}'
+        (tmp_path / "match_info.json").write_text(text)
+        found = read(tmp_path, report)
+        assert {key: record["match"] for key, record in found.items()} == {"1": "m", "2": "n"}
+        assert report.problems == []
+        assert len(report.remarks) == 1 and "1.jpg" in report.remarks[0]
+
+    def test_a_file_of_matches_counts_where_no_other_says_anything(
+        self, tmp_path: Path, report: ReaderReport
+    ) -> None:
+        (tmp_path / "match_info.json").write_text('{"1.jpg": {"match": "m"}}')
+        matches = {
+            "l/s/other": {"1.jpg": {"half": 1}, "2.jpg": {"half": 2}},
+            "l/s/wrong": 3,
+        }
+        (tmp_path / "per_match_info.json").write_text(json.dumps(matches))
+        assert read(tmp_path, report) == {
+            "1": {"match": "m"},
+            "2": {"match": "l/s/other", "half": 2},
+        }
+        assert [item.record for item in report.problems] == ["l/s/wrong"]
+
     def test_a_file_that_is_no_object_is_reported(
         self, tmp_path: Path, report: ReaderReport
     ) -> None:

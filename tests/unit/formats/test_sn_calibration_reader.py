@@ -9,7 +9,7 @@ import pytest
 
 from app.errors import DatasetFormatError
 from app.formats.report import ReaderReport
-from app.formats.sn_calibration import DEFAULT_SIZE
+from app.formats.sn_calibration import DEFAULT_SIZE, NO_FRAMES
 from app.formats.sn_calibration_reader import lines_from_json, read_line_files, read_sn_calibration
 from app.soccer.frames import ImageSize
 from app.soccer.group import Media
@@ -114,6 +114,15 @@ class TestLinesFromJson:
 
 
 class TestReadLineFiles:
+    @pytest.mark.parametrize("name", NO_FRAMES)
+    def test_what_lies_beside_frames_is_none(
+        self, tmp_path: Path, report: ReaderReport, name: str
+    ) -> None:
+        (tmp_path / "00001.json").write_text('{"Middle line": [{"x": 0.5, "y": 0.5}]}')
+        (tmp_path / name).write_text("{}")
+        assert [file.stem for file in read_line_files(tmp_path, DEFAULT_SIZE, report)] == ["00001"]
+        assert (report.read, report.problems) == (1, [])
+
     def test_a_zip_is_read_by_name_without_cameras_and_match_infos(
         self, make_zip: Callable[..., Path], report: ReaderReport
     ) -> None:

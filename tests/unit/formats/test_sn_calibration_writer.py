@@ -57,6 +57,36 @@ class TestWriteSnCalibration:
         assert set(read_cameras(tmp_path, report)) == {f"{group.match}/7", f"{group.match}/7_1"}
         assert report.problems == []
 
+    def test_a_split_of_any_name_comes_back_with_the_size_of_its_images(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
+    ) -> None:
+        group = soccer_group(split="fold-3")
+        write_sn_calibration(tmp_path, [solved(group)])
+        again = list(read_sn_calibration(tmp_path, DEFAULT_SIZE, report))
+        assert {(item.split, item.views[0].size) for item in again} == {
+            ("fold-3", ImageSize(1280, 720))
+        }
+        assert [item.views[0].station.lines for item in again] == [
+            view.station.lines for view in group.views
+        ]
+        for folder in (tmp_path, tmp_path / "lines", tmp_path / "lines/fold-3-1280x720"):
+            files = read_line_files(folder, DEFAULT_SIZE, report, by_folder=True)
+            assert [file.size for file in files] == [ImageSize(1280, 720)] * 2, folder
+        assert report.problems == []
+        assert len(report.remarks) == 1 and '"fold-3"' in report.remarks[0]
+
+    def test_a_folder_of_other_people_says_neither_split_nor_size(
+        self, tmp_path: Path, report: ReaderReport
+    ) -> None:
+        folder = tmp_path / "lines/clips-1920x1080"
+        folder.mkdir(parents=True)
+        (folder / "1.json").write_text('{"Middle line": [{"x": 0.5, "y": 0.5}]}')
+        (tmp_path / "match_info.json").write_text('{"lines/clips-1920x1080/1.jpg": "m"}')
+        (group,) = read_sn_calibration(tmp_path, DEFAULT_SIZE, report)
+        assert (group.split, group.views[0].size) == ("", DEFAULT_SIZE)
+        (file,) = read_line_files(tmp_path / "lines", DEFAULT_SIZE, report, by_folder=True)
+        assert file.size == DEFAULT_SIZE
+
     def test_a_folder_holds_nothing_but_frames_of_one_split_and_one_size(
         self, tmp_path: Path, solved: Solved, soccer_group: Make
     ) -> None:

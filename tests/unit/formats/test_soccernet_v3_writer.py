@@ -23,9 +23,10 @@ from app.formats.soccernet_v3_writer import (
     write_soccernet_v3,
     write_soccernet_v3d,
 )
+from app.formats.soccernet_v3d_reader import read_soccernet_v3d
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation
-from app.soccer.frames import Box
+from app.soccer.frames import Box, ImagePoint
 from app.soccer.group import Group
 
 Solved = Callable[..., ExportRecord]
@@ -169,6 +170,22 @@ class TestWriteSoccernetV3d:
     ) -> None:
         write_soccernet_v3d(tmp_path, [solved(soccer_group())], boxes="exact")
         assert {row["ball_bbox"] for row in _rows(tmp_path)} == {"[610.0, 300.0, 12.0, 11.0]"}
+
+    def test_a_ball_that_is_a_point_is_a_box_without_area_and_comes_back(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
+    ) -> None:
+        group = soccer_group()
+        point = BallAnnotation(point=ImagePoint(12.5, 34.25))
+        for view in group.views:
+            group = group.with_view(replace(view, balls=(point,)))
+        write_soccernet_v3d(tmp_path, [solved(group)], everything=True)
+        cells = {(row["is_ball"], row["ball_bbox"]) for row in _rows(tmp_path)}
+        assert cells == {("True", "[12.5, 34.25, 0.0, 0.0]")}
+        for labels in tmp_path.rglob("Labels-v3D.json"):
+            labels.unlink()
+        (again,) = read_soccernet_v3d(tmp_path, report)
+        assert [view.balls for view in again.views] == [(point,)] * len(group.views)
+        assert report.problems == []
 
     def test_several_balls_stay_as_they_are(
         self, tmp_path: Path, solved: Solved, soccer_group: Make, match: str

@@ -160,6 +160,46 @@ class TestReadSoccernetV3d:
         read(json.dumps(solved_labels), rows)
         assert [item.record for item in report.problems] == ["7_5.png"]
 
+    @pytest.mark.parametrize("spelt", ["7{}.jpg", "0007{}.png", "07{}.jpeg"])
+    def test_rows_belong_to_images_by_their_numbers_however_these_are_spelt(
+        self,
+        read: Callable[..., list[Group]],
+        solved_labels: Value,
+        match: str,
+        tmp_path: Path,
+        report: ReaderReport,
+        spelt: str,
+    ) -> None:
+        text = json.dumps(solved_labels)
+        for replay in ("", "_0", "_1"):
+            text = text.replace(f"7{replay}.png", spelt.format(replay))
+        (tmp_path / "SNv3D-test.txt").write_text(f"{match.rpartition('/')[2]}/7\n")
+        rows = table(
+            match,
+            '7,True,,1280,720,"[600, 300, 14, 13]",train',
+            '7,0,1,1280,720,"[500, 300, 14, 13]",train',
+        )
+        first, second = read(text, rows)
+        assert [view.key for view in first.views] == [
+            spelt.format(replay) for replay in ("", "_1", "_0")
+        ]
+        assert [view.balls[0].box for view in first.views[:2]] == [
+            Box(600.0, 300.0, 14.0, 13.0),
+            Box(500.0, 300.0, 14.0, 13.0),
+        ]
+        assert (first.split, second.key) == ("test", f"{match}/8.png")
+        assert report.problems == [] and report.remarks == []
+
+    @pytest.mark.parametrize("name", ["7.png", "0007.png", "7.jpg"])
+    def test_a_frame_of_the_table_alone_is_found_by_its_numbers(
+        self, read: Callable[..., list[Group]], match: str, tmp_path: Path, name: str
+    ) -> None:
+        (tmp_path / match).mkdir(parents=True)
+        (tmp_path / match / name).write_bytes(b"x")
+        (group,) = read(None, table(match, "7,1,,1280,720,,train"))
+        assert group.views[0].media is not None
+        assert group.views[0].media.path == str(tmp_path / match / name)
+
     def test_actions_of_the_split_lists_that_did_not_come_are_said(
         self,
         read: Callable[..., list[Group]],
