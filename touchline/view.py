@@ -96,7 +96,16 @@ class View:
 
     @cached_property
     def lines(self) -> Mapping[str, tuple[tuple[float, float], ...]]:
-        """Annotated markings: points in pixels by the marking's name."""
+        """Annotated markings: points in pixels by the marking's name; each has at least one."""
+        return {name: points for name, points in self._marked.items() if points}
+
+    @cached_property
+    def not_visible(self) -> frozenset[str]:
+        """Names of the markings that a person says the picture does not show."""
+        return frozenset(name for name, points in self._marked.items() if not points)
+
+    @cached_property
+    def _marked(self) -> Mapping[str, tuple[tuple[float, float], ...]]:
         found = json.loads(self.lines_json or "{}")
         return {name: tuple((x, y) for x, y in points) for name, points in found.items()}
 

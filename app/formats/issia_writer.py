@@ -17,6 +17,7 @@ from app.formats.sn_calibration_writer import format_line_file
 from app.formats.view_files import Key, SortedSpill, open_spill
 from app.json_text import json_text
 from app.soccer.annotation import CORNERS
+from app.soccer.frames import ImageSize
 from app.soccer.group import Group, Station, View
 
 _BALL, _NOTE, _PERSON = 0, 1, 2
@@ -28,6 +29,10 @@ _NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _HEAD = """<?xml version="1.0" encoding="UTF-8"?>
 <viper xmlns="http://lamp.cfar.umd.edu/viper#" xmlns:data="http://lamp.cfar.umd.edu/viperdata#">
   <config>
+    <descriptor name="Information" type="FILE">
+      <attribute dynamic="false" name="H-FRAME-SIZE" type="http://lamp.cfar.umd.edu/viperdata#dvalue"/>
+      <attribute dynamic="false" name="V-FRAME-SIZE" type="http://lamp.cfar.umd.edu/viperdata#dvalue"/>
+    </descriptor>
     <descriptor name="BALL" type="OBJECT">
       <attribute dynamic="true" name="BallPos" type="http://lamp.cfar.umd.edu/viperdata#point"/>
     </descriptor>
@@ -37,6 +42,15 @@ _HEAD = """<?xml version="1.0" encoding="UTF-8"?>
   </config>
   <data>
     <sourcefile filename=%s>
+"""
+_INFORMATION = """      <file id="0" name="Information">
+        <attribute name="H-FRAME-SIZE">
+          <data:dvalue value="%d"/>
+        </attribute>
+        <attribute name="V-FRAME-SIZE">
+          <data:dvalue value="%d"/>
+        </attribute>
+      </file>
 """
 _TAIL = """    </sourcefile>
   </data>
@@ -51,7 +65,8 @@ def write_issia(
 
     ``issia_calibration.json`` holds the cameras that were given, ``lines/cam<n>.json`` the
     annotated lines; neither is computed. Frame numbers are those of the groups plus 8. A ball
-    is its centre, whole pixels as integers.
+    is its centre, whole pixels as integers. ``H-FRAME-SIZE`` and ``V-FRAME-SIZE`` are the size of
+    the images.
 
     Args:
         root: Existing folder.
@@ -72,7 +87,9 @@ def write_issia(
             frame = known.claim_frame_number(group) + DEFAULT_OFFSET
             for view in group.views:
                 station = view.station
-                camera = known.claim_camera_number(group, view, (station.given, station.lines))
+                camera = known.claim_camera_number(
+                    group, view, (station.given, station.lines, station.size)
+                )
                 stations.setdefault(camera, view.station)
                 _add_balls(spill, camera, frame, view, counts)
                 _add_persons(spill, camera, frame, view.extras.boxes, counts)
@@ -80,7 +97,9 @@ def write_issia(
             camera = int(item.camera.removeprefix("cam"))
             _add_persons(spill, camera, item.frame + DEFAULT_OFFSET, item.boxes, counts)
         for camera, items in groupby(spill.items(), key=lambda item: item[0][0]):
-            _write_ground_truth(root / f"ground_truth_{camera}.xgtf", camera, items)
+            # People of a camera without a ball came without the size of its images.
+            size = stations[camera].size if camera in stations else None
+            _write_ground_truth(root / f"ground_truth_{camera}.xgtf", camera, size, items)
             counts["cameras"] += 1
     _write_cameras_and_lines(root, stations)
     return counts
@@ -145,10 +164,14 @@ def _format_quoted_attribute(value: Any) -> str:
     return quoteattr(_NO_XML.sub("", str(value)).replace(_BREAK, " "))
 
 
-def _write_ground_truth(path: Path, camera: int, items: Iterable[tuple[Key, str]]) -> None:
+def _write_ground_truth(
+    path: Path, camera: int, size: ImageSize | None, items: Iterable[tuple[Key, str]]
+) -> None:
     """One camera: an object for the ball, and one for each person."""
     with path.open("w", encoding="utf-8", newline="\n") as file:
         file.write(_HEAD % quoteattr(f"cam{camera}.mp4"))
+        if size is not None:
+            file.write(_INFORMATION % (size.width, size.height))
         for is_person, part in groupby(items, key=lambda item: item[0][1] == _PERSON):
             if is_person:
                 _write_persons(file, part)

@@ -13,7 +13,7 @@ from app.formats.issia_writer import write_issia
 from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
-from app.soccer.frames import ImagePoint
+from app.soccer.frames import ImagePoint, ImageSize
 from app.soccer.group import Group
 
 Make = Callable[..., Group]
@@ -47,6 +47,19 @@ class TestWriteIssia:
         for written in groups:
             assert again[written.key].views == written.views
         assert list(folder.persons_without_ball()) == unassigned
+        assert report.problems == []
+
+    def test_the_size_of_the_images_comes_back(
+        self, tmp_path: Path, issia_group: Make, report: ReaderReport
+    ) -> None:
+        group = issia_group(358)
+        small = tuple(
+            replace(view, station=replace(view.station, size=ImageSize(1280, 720)))
+            for view in group.views
+        )
+        write_issia(tmp_path, [replace(group, views=small)])
+        (again,) = open_issia(tmp_path, IssiaOptions(), report).groups()
+        assert {view.size for view in again.views} == {ImageSize(1280, 720)}
         assert report.problems == []
 
     def test_whole_pixels_are_whole_numbers_and_frames_are_shifted(

@@ -53,6 +53,20 @@ class TestRecords:
                     for name, points in said.station.lines.items()
                 }
 
+    def test_a_marking_that_the_picture_does_not_show_is_no_line(
+        self, records: list[ExportRecord], tmp_path: Path
+    ) -> None:
+        group = records[0].group
+        view = group.views[0]
+        gone = sorted(view.station.lines)[0]
+        lines = {name: points for name, points in view.station.lines.items() if name != gone}
+        station = replace(view.station, lines=lines, not_visible=(gone,))
+        record = replace(records[0], group=group.with_view(replace(view, station=station)))
+        (found,) = touchline.open(write_export(tmp_path / "out", [record], images=False))
+        assert set(found.views[0].lines) == set(lines)
+        assert found.views[0].not_visible == {gone}
+        assert found.views[1].not_visible == frozenset()
+
     def test_a_ball_projects_to_where_the_server_says(self, version: touchline.Dataset) -> None:
         balls = [(view, view.ball, view.ball_3d) for view in version.views if view.ball_3d]
         assert len(balls) >= 6

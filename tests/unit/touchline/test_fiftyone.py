@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 import touchline
 from touchline.errors import DataError, MissingPackageError
-from touchline.fiftyone import _written, to_fiftyone, to_samples
+from touchline.fiftyone import _polylines, _written, to_fiftyone, to_samples
 
 
 @pytest.fixture
@@ -67,6 +68,16 @@ class TestToSamples:
         assert (width * view.width, height * view.height) == pytest.approx((box.width, box.height))
         labels = {line.label for line in sample["lines"].polylines}
         assert labels == set(view.lines)
+
+
+class TestPolylines:
+    def test_a_marking_that_the_picture_does_not_show_is_no_polyline(self, export: Path) -> None:
+        view = replace(
+            touchline.open(export).views[0],
+            lines_json='{"Middle line": [], "Side line top": [[1.0, 2.0]]}',
+        )
+        package = SimpleNamespace(Polyline=SimpleNamespace)
+        assert [line.label for line in _polylines(package, view)] == ["Side line top"]
 
 
 class TestWritten:
