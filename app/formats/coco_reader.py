@@ -168,6 +168,8 @@ class _CocoFileReader:
         self.categories = CocoCategories(
             self._get_list("categories"), annotations, self.path, report, ball_category
         )
+        self._has_annotations = isinstance(value.get("annotations"), list)
+        self._removed: list[str] = []
         self._joined = AnnotationsByImage(value["images"], annotations, self.path, report)
         self.captions = self._joined.captions
 
@@ -201,6 +203,7 @@ class _CocoFileReader:
                     self.frames.frames.append(self._read_foreign_image(image, index))
             except DatasetFormatError as error:
                 self._report.add_problem(self._add_annotation_count_to_error(error, index))
+        self._report_removed_balls()
 
     def _add_annotation_count_to_error(
         self, error: DatasetFormatError, index: int
@@ -223,7 +226,7 @@ class _CocoFileReader:
     def _apply_box_changes(
         self, index: int, view: View, from_corner: bool
     ) -> tuple[BallAnnotation, ...]:
-        """The balls, with the boxes that somebody changed or added after they were written.
+        """The balls, with the boxes that somebody changed, added or removed after they were written.
 
         Args:
             index: Of the image, whose annotations are looked at.
@@ -235,11 +238,17 @@ class _CocoFileReader:
         added = self._read_added_balls(annotations, from_corner)
         if not view.balls:
             return tuple(added)
+        if view.ball is None and any(ball.box for ball in view.balls):
+            # Of several balls no box was written, so that every box is one more to pick from.
+            return self._join_candidates(view, added)
         # A tool that drops fields that it does not know hands the written box on as a new one.
         written = any("written_bbox" in item for _, item in annotations)
         if written or not any(ball.box for ball in view.balls):
             for record in added.values():
                 self._report_problem(record, "bbox", "adds a ball to a view that has one; left out")
+        if self._lacks_written_box(view, annotations):
+            self._removed.append(view.key)
+            return tuple(ball for ball in view.balls if ball.out_of_view)
         if len(view.balls) != 1:
             return view.balls
         for record, item in annotations:
@@ -249,6 +258,37 @@ class _CocoFileReader:
                     box = box_from_corner_origin(box) if from_corner else box
                     return (replace(view.balls[0], box=box, point=None),)
         return view.balls
+
+    def _join_candidates(
+        self, view: View, added: Mapping[BallAnnotation, str]
+    ) -> tuple[BallAnnotation, ...]:
+        """The balls of a view with several, and those that were added."""
+        known = {ball.box for ball in view.balls}
+        for ball, record in added.items():
+            if ball.box in known:
+                self._report_problem(
+                    record, "bbox", "puts a second ball at the same place; left out"
+                )
+        return (*view.balls, *(ball for ball in added if ball.box not in known))
+
+    def _lacks_written_box(self, view: View, annotations: list[Annotation]) -> bool:
+        """Whether the box of a view's ball, which every export writes, is gone: a person removed it."""
+        if view.ball is None or view.ball.box is None or not self._has_annotations:
+            return False
+        for _, item in annotations:
+            category = self.categories.find(item.get("category_id"))
+            if "written_bbox" in item or category is None or category.ball:
+                return False
+        return True
+
+    def _report_removed_balls(self) -> None:
+        if self._removed:
+            names = ", ".join(self._removed[:5]) + (", ..." if len(self._removed) > 5 else "")
+            views = plural(len(self._removed), "view")
+            self._report.add_remark(
+                f"{self.path}: the ball box of {views} ({names}) was removed since the export; its"
+                " ball is removed here, too"
+            )
 
     def _read_added_balls(
         self, annotations: list[Annotation], from_corner: bool

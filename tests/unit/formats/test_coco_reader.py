@@ -157,6 +157,60 @@ class TestReadCoco:
             "adds a ball to a view that has one; left out"
         ]
 
+    def test_a_box_added_to_a_view_with_several_balls_is_one_more_to_pick_from(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
+    ) -> None:
+        group = soccer_group(replays=0)
+        two = tuple(BallAnnotation(box=Box(x, 300.0, 12.0, 11.0)) for x in (610.0, 700.0))
+        group = group.with_view(replace(group.views[0], balls=two))
+        write_coco(tmp_path, [solved(group, ball=False)], everything=True)
+        (path,) = tmp_path.glob("annotations/*.json")
+        value = json.loads(path.read_text())
+        assert value["annotations"] == []
+        value["annotations"] = [
+            ball(1, 98, bbox=[600, 301, 20, 21]),
+            ball(1, 99, bbox=[610.5, 300.5, 12, 11]),
+        ]
+        path.write_text(json.dumps(value))
+        (again,) = read_coco(tmp_path, report)
+        assert again.views[0].balls == (*two, BallAnnotation(box=Box(599.5, 300.5, 20.0, 21.0)))
+        assert [(item.record, item.problem) for item in report.problems] == [
+            ("annotations[1]", "puts a second ball at the same place; left out")
+        ]
+
+    @pytest.mark.parametrize("left", [[], [{"category_id": 2}]])
+    def test_a_box_that_was_removed_leaves_no_ball_and_is_said(
+        self,
+        tmp_path: Path,
+        solved: Solved,
+        soccer_group: Make,
+        report: ReaderReport,
+        left: list[dict[str, Any]],
+    ) -> None:
+        write_coco(tmp_path, [solved(soccer_group(), ball=False)], everything=True)
+        path = tmp_path / "annotations/instances_train.json"
+        value = json.loads(path.read_text())
+        value["annotations"] = value["annotations"][1:] + [ball(1, 98) | item for item in left]
+        value["categories"].append({"id": 2, "name": "Player"})
+        path.write_text(json.dumps(value))
+        (group,) = read_coco(tmp_path, report)
+        assert [len(view.balls) for view in group.views] == [0, 1]
+        (remark,) = report.remarks
+        assert "the ball box of 1 view (7.png) was removed since the export" in remark
+
+    def test_a_file_without_a_list_of_annotations_removes_no_ball(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
+    ) -> None:
+        group = soccer_group()
+        write_coco(tmp_path, [solved(group, ball=False)], everything=True)
+        path = tmp_path / "annotations/instances_train.json"
+        value = json.loads(path.read_text())
+        del value["annotations"]
+        path.write_text(json.dumps(value))
+        (again,) = read_coco(tmp_path, report)
+        assert [view.balls for view in again.views] == [view.balls for view in group.views]
+        assert report.remarks == []
+
     def test_an_export_of_ours_that_says_no_origin_has_its_boxes_in_our_frame(
         self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
     ) -> None:
