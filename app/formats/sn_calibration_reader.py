@@ -125,7 +125,8 @@ def read_line_files_of_tree(
             stays = exported is not None or (ours.own_sizes and document.size is not None)
             made = drawn if stays else size
             shown = tree.shown(name)
-            lines, others = lines_from_json(document.lines, made, shown, report, drawn)
+            record = None if where == whole else document.name
+            lines, others = lines_from_json(document.lines, made, shown, report, drawn, record)
             image = beside.get(where)
             media = None if image is None else tree.media(image)
             report.imported += 1
@@ -195,7 +196,12 @@ def _index_images_by_stem(names: Iterable[str]) -> dict[str, str]:
 
 
 def lines_from_json(
-    value: Any, size: ImageSize, path: str, report: ReaderReport, drawn: ImageSize | None = None
+    value: Any,
+    size: ImageSize,
+    path: str,
+    report: ReaderReport,
+    drawn: ImageSize | None = None,
+    record: str | None = None,
 ) -> tuple[Lines, tuple[Mapping[str, Any], ...]]:
     """Lines with geometry, and the others, of one image, in pixels.
 
@@ -208,26 +214,28 @@ def lines_from_json(
         path: File as the user knows it, for problems.
         report: Takes what had to be left out.
         drawn: Size of the image that pixels of the file are of; None: ``size``.
+        record: Name of the image in a file of many, for problems.
 
     Raises:
         DatasetFormatError: The file is no object at all.
     """
     if not isinstance(value, dict):
         raise DatasetFormatError(
-            path, None, None, "is not an object that maps line names to lists of points"
+            path, record, None, "is not an object that maps line names to lists of points"
         )
+    place = (path, record)
     known: dict[str, list[ImagePoint]] = {}
     others = []
-    points = {name: _read_points(item, path, name, report) for name, item in value.items()}
+    points = {name: _read_points(item, place, name, report) for name, item in value.items()}
     every = [point for line in points.values() for _, point in line]
     in_pixels = 2 * sum(map(_is_far_outside, every)) >= max(len(every), 1)
     for name, numbered in points.items():
         line = [point for _, point in numbered]
         if not in_pixels:
-            line = _select_points_near_image(numbered, path, name, report)
+            line = _select_points_near_image(numbered, place, name, report)
         to_pixel = partial(_rescale_pixel, drawn or size, size) if in_pixels else size.unit_to_pixel
         pixels = [to_pixel(*point) for point in line]
-        marking = _read_marking_name(name, path, report)
+        marking = _read_marking_name(name, place, report)
         if marking is None:
             flat = [coordinate for point in pixels for coordinate in point]
             others.append({"class": name, "points": flat})
@@ -246,6 +254,8 @@ def _rescale_pixel(drawn: ImageSize, size: ImageSize, x: float, y: float) -> Ima
 
 _Numbered = list[tuple[int, tuple[float, float]]]
 """Points of a line, each with its number in the file, from 1."""
+_Place = tuple[str, str | None]
+"""File, and image of a file of many, for problems."""
 
 
 def _is_far_outside(point: tuple[float, float]) -> bool:
@@ -253,14 +263,14 @@ def _is_far_outside(point: tuple[float, float]) -> bool:
 
 
 def _select_points_near_image(
-    line: _Numbered, path: str, name: str, report: ReaderReport
+    line: _Numbered, place: _Place, name: str, report: ReaderReport
 ) -> list[tuple[float, float]]:
     """The points of a line of a normalised file that can be normalised; others are reported."""
     far = [number for number, point in line if _is_far_outside(point)]
     if far:
         x, y = next(point for _, point in line if _is_far_outside(point))
         problem = f"({x:g}, {y:g}) is far outside the image, and the file is normalised"
-        report.add_problem_at(path, None, name, f"{problem}; {_describe_left_out_points(far)}")
+        report.add_problem_at(*place, name, f"{problem}; {_describe_left_out_points(far)}")
     return [point for _, point in line if not _is_far_outside(point)]
 
 
@@ -269,7 +279,7 @@ def _describe_left_out_points(numbers: Sequence[int]) -> str:
     return f"points {listed} are left out" if len(numbers) > 1 else f"point {listed} is left out"
 
 
-def _read_points(value: Any, path: str, name: str, report: ReaderReport) -> _Numbered:
+def _read_points(value: Any, place: _Place, name: str, report: ReaderReport) -> _Numbered:
     """The sound points of a line; they are in no order, so that one less says nothing false."""
     points: _Numbered = []
     bad: list[int] = []
@@ -277,7 +287,7 @@ def _read_points(value: Any, path: str, name: str, report: ReaderReport) -> _Num
     try:
         listed = fields.require_list(value)
     except ValueError as error:
-        report.add_problem_at(path, None, name, f"{error}; the line is left out")
+        report.add_problem_at(*place, name, f"{error}; the line is left out")
         return []
     for number, item in enumerate(listed, 1):
         try:
@@ -286,7 +296,7 @@ def _read_points(value: Any, path: str, name: str, report: ReaderReport) -> _Num
             bad.append(number)
             first = first or str(error)
     if bad:
-        report.add_problem_at(path, None, name, f"{first}; {_describe_left_out_points(bad)}")
+        report.add_problem_at(*place, name, f"{first}; {_describe_left_out_points(bad)}")
     return points
 
 
@@ -302,12 +312,12 @@ def _parse_point(item: Any) -> tuple[float, float]:
     return fields.parse_pixel_coordinate(x), fields.parse_pixel_coordinate(y)
 
 
-def _read_marking_name(name: str, path: str, report: ReaderReport) -> str | None:
+def _read_marking_name(name: str, place: _Place, report: ReaderReport) -> str | None:
     """The marking of that name; None (reported unless the format knows it) for any other."""
     found = find_marking_like(name)
     if found is None and name.replace("_", " ").strip() not in WITHOUT_GEOMETRY:
         problem = UnknownMarkingError(name).message
-        report.add_problem_at(path, None, name, f"{problem}; kept for export and not used")
+        report.add_problem_at(*place, name, f"{problem}; kept for export and not used")
     return found
 
 

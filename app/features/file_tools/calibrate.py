@@ -24,6 +24,7 @@ from app.features.file_tools.matches import (
     read_match_of_each_frame,
 )
 from app.formats.cameras import camera_file_name, format_camera_file, read_cameras
+from app.formats.frame_names import strip_image_suffix
 from app.formats.json_reader import read_json
 from app.formats.report import ReaderReport
 from app.formats.safe_path import read_regular_file
@@ -163,7 +164,8 @@ def calibrate_files(
             )  # fmt: skip
         frames = collect_frames(jobs, len(files))
     frames = [_map_frame_to_given_picture(frame, geometry, size) for frame in frames]
-    summary = _make_summary(frames, report, time.perf_counter() - began)
+    lost = _find_frames_without_lines(source, files, report)
+    summary = _make_summary(frames, lost, report, time.perf_counter() - began)
     if sharing:
         summary["matches"] = groups
     if picture_summary is not None:
@@ -283,18 +285,37 @@ def _map_frame_to_given_picture(
     )
 
 
+def _find_frames_without_lines(
+    source: Path, files: Sequence[LineFile], report: ReaderReport
+) -> dict[str, str]:
+    """Frames whose lines could not be read, with the reason; what is wrong in others is none of it."""
+    came = {file.place for file in files}
+    lost: dict[str, str] = {}
+    for problem in report.problems:
+        path = Path(problem.path)
+        if path.suffix.lower() != ".json":
+            continue
+        inside = path.relative_to(source) if path.is_relative_to(source) else path
+        whole = inside if inside.name else Path(path.name)
+        image = strip_image_suffix(problem.record.rsplit("/", 1)[-1]) if problem.record else None
+        place = (whole.parent / image if image else whole.with_suffix("")).as_posix()
+        if place not in came:
+            lost.setdefault(place, problem.message)
+    names = Counter(place.rsplit("/", 1)[-1] for place in (*came, *lost))
+    bare = {place: place.rsplit("/", 1)[-1] for place in lost}
+    return {
+        bare[place] if names[bare[place]] == 1 else place: reason for place, reason in lost.items()
+    }
+
+
 def _make_summary(
-    frames: list[CalibratedFrame], report: ReaderReport, seconds: float
+    frames: list[CalibratedFrame], lost: Mapping[str, str], report: ReaderReport, seconds: float
 ) -> dict[str, Any]:
     times = [frame.milliseconds for frame in frames]
     failed = [
         {"frame": frame.stem, "reason": frame.reason} for frame in frames if frame.camera is None
     ]
-    failed += [
-        {"frame": Path(problem.path).stem, "reason": problem.message}
-        for problem in report.problems
-        if Path(problem.path).stem not in {frame.stem for frame in frames}
-    ]
+    failed += [{"frame": name, "reason": reason} for name, reason in lost.items()]
     return {
         "frames": report.read,
         "calibrated": len(frames) - sum(frame.camera is None for frame in frames),

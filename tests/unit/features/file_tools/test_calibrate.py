@@ -118,6 +118,33 @@ class TestCalibrateFiles:
         assert "broken" in {item["frame"] for item in summary["failed"]}
         assert "broken.json" in summary["problems"][0]
 
+    def test_a_bad_point_fails_no_frame(self, tmp_path):
+        source = tmp_path / "lines"
+        write(source / "train", same=click(MAIN, 0.5))
+        write(source / "valid", same=click(OPPOSITE, 0.5))
+        file = source / "train/same.json"
+        value = json.loads(file.read_text())
+        value["Middle line"] = [*value.get("Middle line", []), {"x": "left", "y": 0.5}]
+        file.write_text(json.dumps(value))
+        (source / "valid/same.json").write_text("{")
+        summary = run(source, tmp_path / "out")
+        assert [item["frame"] for item in summary["failed"]] == ["valid/same"]
+        assert len(summary["problems"]) == 2
+
+    def test_images_of_one_file_are_named_in_problems_and_failures(self, tmp_path):
+        source = write(tmp_path / "lines", a=click(MAIN, 0.5), b=click(OPPOSITE, 0.5))
+        images = {}
+        for stem in ("a", "b"):
+            images[f"{stem}.jpg"] = json.loads((source / f"{stem}.json").read_text())
+            (source / f"{stem}.json").unlink()
+        images["a.jpg"]["Middle line"] = [{"x": "left", "y": 0.5}]
+        images["c.jpg"] = {"keypoints": [1, 2, 3]}
+        (source / "all.json").write_text(json.dumps(images))
+        summary = run(source, tmp_path / "out")
+        assert [item["frame"] for item in summary["failed"]] == ["c"]
+        assert summary["frames"] == summary["calibrated"] + len(summary["failed"])
+        assert any("all.json, a, Middle line" in problem for problem in summary["problems"])
+
     def test_frames_of_the_same_name_stay_in_their_folders(self, tmp_path):
         source = tmp_path / "lines"
         write(source / "train", same=click(MAIN, 0.5))
