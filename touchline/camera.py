@@ -73,23 +73,23 @@ class Camera:
         """The camera of SoccerNet's JSON, as ``camera_<frame>.json`` holds it.
 
         The angles count; a ``rotation_matrix`` that is theirs but for rounding has more digits.
-        Distortion that is not there is none.
+        Distortion that is not there is none. Numbers may be written as text.
 
         Raises:
-            CameraError: A number is missing.
+            CameraError: A number is missing, or none; it names the field.
         """
-        try:
-            return Camera(
-                rotation=tuple(map(tuple, _rotation(document).tolist())),
-                position=tuple(document["position_meters"]),
-                focal_length=(document["x_focal_length"], document["y_focal_length"]),
-                principal_point=tuple(document["principal_point"]),
-                skew=document.get("skew", 0.0),
-                distortion=_coefficients(document),
-                lens=document.get("lens") or BROWN_CONRADY,
-            )
-        except (KeyError, TypeError, ValueError) as error:
-            raise CameraError(f"this is not a camera in SoccerNet's JSON ({error!r})") from None
+        return Camera(
+            rotation=tuple(map(tuple, _rotation(document).tolist())),
+            position=_numbers(document, "position_meters", 3),
+            focal_length=(
+                *_numbers(document, "x_focal_length"),
+                *_numbers(document, "y_focal_length"),
+            ),
+            principal_point=_numbers(document, "principal_point", 2),
+            skew=0.0 if document.get("skew") is None else _numbers(document, "skew")[0],
+            distortion=_coefficients(document),
+            lens=document.get("lens") or BROWN_CONRADY,
+        )
 
     @cached_property
     def K(self) -> FloatArray:
@@ -198,14 +198,41 @@ class Camera:
         return self._lens.undistort(np.column_stack([x, y]))
 
 
+def _numbers(document: Mapping[str, Any], name: str, count: int | None = None) -> tuple[float, ...]:
+    """The numbers of a field; without a count it is one number alone.
+
+    Raises:
+        CameraError: They are missing, of another count, or no finite numbers.
+    """
+    value = document.get(name) if isinstance(document, Mapping) else None
+    try:
+        if value is None:
+            raise ValueError("is missing")
+        found = np.array(value, dtype=np.float64)
+        if found.shape != (() if count is None else (count,)):
+            raise ValueError("is not one number" if count is None else f"is not {count} numbers")
+        if not np.isfinite(found).all():
+            raise ValueError("is not finite")
+    except (TypeError, ValueError) as error:
+        raise CameraError(f"this is not a camera in SoccerNet's JSON: {name} {error}") from None
+    return tuple(np.atleast_1d(found).tolist())
+
+
 def _rotation(document: Mapping[str, Any]) -> FloatArray:
     """``(Rz(pan) Rx(tilt) Rz(roll))^T``, shape (3, 3)."""
     names = ("pan_degrees", "tilt_degrees", "roll_degrees")
-    pan, tilt, roll = np.radians([document[name] for name in names])
+    pan, tilt, roll = np.radians([_numbers(document, name)[0] for name in names])
     cosine, sine = np.cos(tilt), np.sin(tilt)
     about_x = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
     rotation: FloatArray = (_about_z(pan) @ about_x @ _about_z(roll)).T
-    given = np.array(document.get("rotation_matrix", rotation), dtype=np.float64).reshape(3, 3)
+    rows = document.get("rotation_matrix")
+    if rows is None:
+        return rotation
+    names = ("first row", "second row", "third row")
+    if not isinstance(rows, (list, tuple)) or len(rows) != 3:
+        raise CameraError("this is not a camera in SoccerNet's JSON: rotation_matrix is not 3 rows")
+    of_matrix = {f"rotation_matrix, {name}": row for name, row in zip(names, rows, strict=True)}
+    given = np.array([_numbers(of_matrix, name, 3) for name in of_matrix])
     return given if np.abs(given - rotation).max() < _ROUNDING else rotation
 
 
@@ -217,11 +244,17 @@ def _about_z(angle: float) -> FloatArray:
 def _coefficients(document: Mapping[str, Any]) -> tuple[float, ...]:
     """Of the lens, in OpenCV's order; SoccerNet has all k before p."""
     if document.get("lens") not in (None, BROWN_CONRADY):
-        return tuple(document["lens_coefficients"])
-    k1, k2, k3, k4, k5, k6 = document.get("radial_distortion") or (0.0,) * 6
-    p1, p2 = document.get("tangential_distortion") or (0.0,) * 2
-    s1, s2, s3, s4 = document.get("thin_prism_distortion") or (0.0,) * 4
+        count = np.size(document.get("lens_coefficients") or ())
+        return _numbers(document, "lens_coefficients", count)
+    k1, k2, k3, k4, k5, k6 = _numbers_or_zeros(document, "radial_distortion", 6)
+    p1, p2 = _numbers_or_zeros(document, "tangential_distortion", 2)
+    s1, s2, s3, s4 = _numbers_or_zeros(document, "thin_prism_distortion", 4)
     return (k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4)
+
+
+def _numbers_or_zeros(document: Mapping[str, Any], name: str, count: int) -> tuple[float, ...]:
+    # An empty list says that there is none, too.
+    return _numbers(document, name, count) if document.get(name) else (0.0,) * count
 
 
 def _rows(values: npt.ArrayLike, width: int) -> tuple[FloatArray, bool]:

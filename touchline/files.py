@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import unicodedata
 import zipfile
 import zlib
+from contextlib import suppress
 from functools import cached_property
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -13,6 +15,8 @@ from typing import Any
 from touchline.errors import DataError, HashError
 
 MANIFEST = "manifest.json"
+_UTF_8 = 0x800
+"""Flag of members of a zip whose names say that they are UTF-8."""
 
 
 class Files:
@@ -28,6 +32,7 @@ class Files:
     def __init__(self, path: Path):
         self.path = path
         self._zip: zipfile.ZipFile | None = None
+        self._spellings: dict[Path, dict[str, str]] = {}
         if path.is_dir():
             return
         try:
@@ -47,15 +52,32 @@ class Files:
             self._zip.close()
 
     @cached_property
-    def names(self) -> frozenset[str]:
-        """Names of the members of a zip; a folder is asked file by file."""
-        return frozenset(self._zip.namelist()) if self._zip else frozenset()
+    def _members(self) -> dict[str, zipfile.ZipInfo]:
+        """Members of a zip by their composed names; a folder is asked file by file."""
+        members = self._zip.infolist() if self._zip else []
+        return {_composed(_member_name(member)): member for member in members}
 
     def holds(self, name: str) -> bool:
-        """Whether there is a file of that name."""
+        """Whether there is a file of that name, however its accents are composed."""
         if self._zip is not None:
-            return name in self.names
-        return is_safe(name) and (self.path / name).is_file()
+            return _composed(name) in self._members
+        return is_safe(name) and self.locate(name).is_file()
+
+    def locate(self, name: str) -> Path:
+        """Where a file of a folder lies, with each part of its name as the disk spells it."""
+        if name.isascii() or (self.path / name).exists():
+            return self.path / name
+        place = self.path
+        for part in PurePosixPath(name).parts:
+            place /= self._spelling(place).get(_composed(part), part)
+        return place
+
+    def _spelling(self, folder: Path) -> dict[str, str]:
+        """What is in a folder: its own spelling of each name, by the composed name."""
+        if folder not in self._spellings:
+            there = folder.iterdir() if folder.is_dir() else ()
+            self._spellings[folder] = {_composed(item.name): item.name for item in there}
+        return self._spellings[folder]
 
     def read(self, name: str) -> bytes:
         """The content of a file.
@@ -66,11 +88,30 @@ class Files:
         if not is_safe(name):
             raise DataError(f'"{name}" leads out of {self.path}')
         try:
-            return self._zip.read(name) if self._zip else (self.path / name).read_bytes()
+            if self._zip is None:
+                return self.locate(name).read_bytes()
+            return self._zip.read(self._members[_composed(name)])
         except (KeyError, FileNotFoundError):
             raise DataError(f"{self.path} contains no {name}") from None
         except (OSError, zipfile.BadZipFile, RuntimeError, zlib.error) as error:
             raise DataError(f"{name} of {self.path} cannot be read ({error})") from None
+
+
+def _composed(name: str) -> str:
+    """A name with each accent in its letter: macOS writes them apart."""
+    return unicodedata.normalize("NFC", name)
+
+
+def _member_name(member: zipfile.ZipInfo) -> str:
+    """The name of a member with forward slashes, in the letters that its writer meant.
+
+    What is UTF-8 byte for byte is taken for that, also without the mark for it, as in an import.
+    """
+    name = member.filename
+    if not name.isascii() and not member.flag_bits & _UTF_8:
+        with suppress(UnicodeError):
+            name = name.encode("cp437").decode("utf-8")
+    return name.replace("\\", "/")
 
 
 def is_safe(name: str) -> bool:

@@ -91,7 +91,7 @@ class FileFrames:
         if match not in self._archives and self._files.path.is_dir():
             if not self._files.holds(f"{match}/{ARCHIVE}"):
                 return None
-            self._archives[match] = Files(self._files.path / match / ARCHIVE)
+            self._archives[match] = Files(self._files.locate(f"{match}/{ARCHIVE}"))
         return self._archives.get(match)
 
 

@@ -299,6 +299,11 @@ def read_camera_arrays(
         found = arrays[_DISTORTION]
         if found.size == 0:
             raise DatasetFormatError(path, None, _DISTORTION, "is empty; leave it out instead")
+        # OpenCV writes the numbers of one camera as a column.
+        rows, most = max(map(len, parts.values())), _NUMBERS[_DISTORTION]
+        is_alone = found.ndim == 2 and len(found) != rows and len(found) <= most
+        if found.shape[-1:] == (1,) and (found.ndim > 2 or is_alone):
+            found = found[..., 0]
         parts[_DISTORTION] = np.atleast_2d(found.reshape(-1, found.shape[-1] if found.ndim else 1))
     counts = {len(part) for part in parts.values()}
     count = max(counts)

@@ -39,9 +39,10 @@ from app.formats.synloc import camera_from_synloc, index_image_records, is_synlo
 from app.formats.trees import open_tree_context
 from app.formats.view_files import PutText, make_disk_writer
 from app.geometry.camera import Camera
-from app.json_text import json_text
+from app.json_text import json_text, quote_text
 from app.soccer.frames import HALF, ImageSize
 from app.soccer.group import Group, View
+from app.wording import plural
 
 _FILE = re.compile(r"(?:camera_)?(.+)\.(?:json|jsonl|ndjson|npz|ya?ml)", re.ASCII | re.IGNORECASE)
 _ENDINGS = ".json, .jsonl, .npz, .yml"
@@ -96,6 +97,7 @@ def read_cameras(
             return {}
         names = tree.names()
         files = _select_camera_files(names)
+        _report_files_not_called_camera(tree, names, files, report)
         if names and not files:
             endings = sorted({PurePosixPath(name).suffix.lower() or "no ending" for name in names})
             report.add_problem_at(
@@ -162,6 +164,28 @@ def _select_camera_files(names: Iterable[str]) -> list[str]:
     names = [name for name in names if _FILE.fullmatch(PurePosixPath(name).name)]
     named = [name for name in names if PurePosixPath(name).name.startswith("camera_")]
     return named or [name for name in names if PurePosixPath(name).name not in NO_FRAMES]
+
+
+def _report_files_not_called_camera(
+    tree: FileTree, names: Iterable[str], read: Sequence[str], report: ReaderReport
+) -> None:
+    """Name the files that may hold cameras, and are not read beside those called ``camera_...``."""
+    known = set(read)
+    left = [
+        name
+        for name in names
+        if name not in known
+        and _FILE.fullmatch((place := PurePosixPath(name)).name)
+        and place.name not in NO_FRAMES
+        # Of an export of ours.
+        and place.parts[0] != LINES
+    ]
+    if read and left:
+        files = plural(len(left), "file is", "files are")
+        report.add_remark(
+            f"{tree.path}: {files} not read, because others are called camera_<name>.json:"
+            f" {_list_first_names(left)}"
+        )
 
 
 def _camera_key(name: str, deep: bool) -> str:
@@ -256,7 +280,7 @@ def _parse_camera_items(
         if lines is None:
             raise
         value = lines
-    several = _list_named_cameras(value, shown)
+    several = _list_named_cameras(value, shown, report)
     if several is not None:
         return several
     # A camera file is called like its view; any other may say the name of its image inside.
@@ -268,7 +292,7 @@ def _parse_camera_items(
     return [(own, value)]
 
 
-def _list_named_cameras(value: Any, shown: str) -> _Items | None:
+def _list_named_cameras(value: Any, shown: str, report: ReaderReport) -> _Items | None:
     """The cameras by name when the file holds several, else None."""
     if isinstance(value, dict) and isinstance(value.get("cameras"), (dict, list)):
         value = value["cameras"]
@@ -292,7 +316,21 @@ def _list_named_cameras(value: Any, shown: str) -> _Items | None:
         raise DatasetFormatError(shown, None, None, describe_document(value))
     if not any(isinstance(item, dict) for item in value.values()):
         return None
-    return [(name, item) for name, item in value.items() if not name.startswith("_")]
+    notes = [name for name, item in value.items() if _is_note(name, item)]
+    if notes:
+        listed = _list_first_names([quote_text(name, 50) for name in notes])
+        report.add_remark(f"{shown}: {listed} holds no camera and was not read")
+    return [(name, item) for name, item in value.items() if name not in notes]
+
+
+def _is_note(name: str, item: Any) -> bool:
+    """Whether a field of a file of cameras is none: ``_comment``, but not ``_DSC0001.jpg``."""
+    is_image = _IMAGE.fullmatch(PurePosixPath(name).suffix) is not None
+    return name.startswith("_") and not is_image and not is_camera(_unwrap_camera(item))
+
+
+def _list_first_names(names: Sequence[str]) -> str:
+    return ", ".join(names[:5]) + (", ..." if len(names) > 5 else "")
 
 
 def _unwrap_camera(value: Any) -> Any:

@@ -268,7 +268,7 @@ PER_MATCH_INFO = "per_match_info.json"
 """Beside the other in sets of 2023: ``{match: {image: record}}``."""
 NO_FRAMES = (
     *MATCH_INFO_FILES, PER_MATCH_INFO, "manifest.json", "findings.json", "calibrate.json",
-    "leave_one_out.json", "propose.json", "snap.json",
+    "leave_one_out.json", "propose.json", "snap.json", "track.json",
 )  # fmt: skip
 """Files beside those of frames that hold neither lines nor a camera."""
 MATCH_INFO_METADATA = "match_info"

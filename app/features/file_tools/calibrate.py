@@ -24,7 +24,7 @@ from app.features.file_tools.matches import (
     read_match_of_each_frame,
 )
 from app.formats.cameras import camera_file_name, format_camera_file, read_cameras
-from app.formats.frame_names import strip_image_suffix
+from app.formats.frame_names import compose_name, strip_image_suffix
 from app.formats.json_reader import read_json
 from app.formats.report import ReaderReport
 from app.formats.safe_path import read_regular_file
@@ -388,7 +388,8 @@ def score_camera_files(
         InputError: There is no line file, or no camera at all.
     """
     report, camera_report = ReaderReport(), ReaderReport()
-    found = _cameras_by_frame(read_cameras(cameras, camera_report))
+    named = read_cameras(cameras, camera_report)
+    found = _cameras_by_frame({compose_name(key): camera for key, camera in named.items()})
     if not found:
         raise camera_report.make_refusal_error(f"{cameras} contains no camera files")
     dropped = _read_wrong_labels(without) if without is not None else set()
@@ -399,7 +400,7 @@ def score_camera_files(
         kept = remove_markings(
             file.lines, {marking for stem, marking in dropped if stem == file.stem}
         )
-        camera = found.get(file.stem)
+        camera = found.get(compose_name(file.stem))
         frames.add(file.stem)
         scores.append(None if camera is None else score_frame(camera, kept, pitch, file.size))
         if progress is not None:

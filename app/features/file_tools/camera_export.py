@@ -49,7 +49,7 @@ def export_cameras(
     report = ReaderReport()
     sizes: dict[str, ImageSize] = {}
     found = read_cameras(source, report, sizes=sizes)
-    cameras = key_by_frame_number(found)
+    cameras = key_by_frame_number(found, source, report)
     if not cameras:
         raise report.make_refusal_error(f"{source} contains no camera_<frame>.json")
     if kind == "npz":
@@ -59,7 +59,8 @@ def export_cameras(
         out.parent.mkdir(parents=True, exist_ok=True)
         replace_file(out, content.getvalue())
     else:
-        _write_opentrackio_samples(source, out, cameras, key_by_frame_number(sizes), size)
+        known = key_by_frame_number(sizes, source, ReaderReport())
+        _write_opentrackio_samples(source, out, cameras, known, size)
     return {
         "cameras": len(cameras),
         "first": min(cameras),
@@ -69,13 +70,34 @@ def export_cameras(
     }
 
 
-def key_by_frame_number(values: Mapping[str, T]) -> dict[int, T]:
-    """What belongs to cameras by the number of their frame: ``camera_00012.json`` is that of frame 12."""
-    found = {}
+def key_by_frame_number(
+    values: Mapping[str, T], source: Path, report: ReaderReport
+) -> dict[int, T]:
+    """What belongs to cameras by the number of their frame: ``camera_00012.json`` is that of frame 12.
+
+    Args:
+        values: By the key of the camera.
+        source: Where the cameras lie, for errors.
+        report: Takes the cameras whose names are no number.
+
+    Raises:
+        InputError: Two cameras are of one frame.
+    """
+    found: dict[int, T] = {}
+    owners: dict[int, str] = {}
     for key, value in values.items():
         stem = key.rsplit("/", 1)[-1]
-        if stem.isascii() and stem.isdigit():
-            found[int(stem)] = value
+        if not (stem.isascii() and stem.isdigit()):
+            problem = "is not called by the number of a frame (camera_00012.json); left out"
+            report.add_problem_at(str(source), f'camera "{key}"', None, problem)
+            continue
+        first = owners.setdefault(int(stem), key)
+        if first != key:
+            raise InputError(
+                f'{source} holds two cameras of frame {int(stem)}, "{first}" and "{key}"',
+                hint="Give the folder of one clip.",
+            )
+        found[int(stem)] = value
     return found
 
 

@@ -178,7 +178,7 @@ def _read_ball_rays(folder: Path, report: ReaderReport) -> BallRays:
     """The rays of the ball of one folder."""
     if not folder.is_dir():
         raise InputError(f"{folder} is not a folder of camera files and {BALL_FILE}")
-    cameras = key_by_frame_number(read_cameras(folder, report))
+    cameras = key_by_frame_number(read_cameras(folder, report), folder, report)
     if not cameras:
         raise report.make_refusal_error(f"{folder} contains no camera_<frame>.json")
     rows = read_ball_rows(folder / BALL_FILE, str(folder / BALL_FILE), report)

@@ -20,7 +20,7 @@ from app.features.groups.view_queries import (
 from app.features.imports.ingest import IngestReport, open_import_session
 from app.features.queue.refresh_queries import refresh_queue
 from app.formats.camera_json import COVARIANCE, covariance_from_json
-from app.formats.frame_names import strip_image_suffix
+from app.formats.frame_names import compose_name, strip_image_suffix
 from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
 from app.soccer.codec import camera_to_json, covariance_to_json
@@ -142,7 +142,7 @@ def _read_stations_by_name(session: Session, dataset_id: int) -> dict[str, list[
         )
         size = ImageSize(row.width, row.height)
         place = NamedStation(row.station_id, None if row.shared else row.group_id, row.match, size)
-        for name in names:
+        for name in map(compose_name, names):
             known = places.setdefault(name, [])
             if place not in known:
                 known.append(place)
@@ -153,7 +153,7 @@ def _find_stations_of_name(
     places: Mapping[str, list[NamedStation]], name: str
 ) -> list[NamedStation]:
     """What a name means; folders before it do not matter where no match could be one of them."""
-    parts = name.split("/")
+    parts = compose_name(name).split("/")
     for start in range(len(parts)):
         found = places.get("/".join(parts[start:]), [])
         if found and (start == 0 or not any(place.match for place in found)):

@@ -41,6 +41,27 @@ class TestCamerasOfArrays:
         np.savez_compressed(tmp_path / "north.npz", **arrays)
         assert list(read_cameras(tmp_path, report)) == ["north"]
 
+    @pytest.mark.parametrize("frames", [1, 3])
+    @pytest.mark.parametrize("each", [False, True])
+    def test_the_numbers_of_a_lens_may_stand_in_a_column(
+        self,
+        tmp_path: Path,
+        arrays: dict[str, np.ndarray],
+        report: ReaderReport,
+        frames: int,
+        each: bool,
+    ) -> None:
+        lens = np.array([0.1, -0.2, 0.001, 0.002, 0.05])
+        cameras = {name: array[:frames].copy() for name, array in arrays.items()}
+        cameras["K"][-1, 0, 0] = 2000.0
+        if frames == 1:
+            cameras = {name: array[0] for name, array in cameras.items()}
+        cameras["k"] = np.stack([lens] * frames)[..., None] if each else lens[:, None]
+        np.savez(tmp_path / "north.npz", **cameras)
+        found = read_cameras(tmp_path, report)
+        assert (len(found), report.problems) == (frames, [])
+        assert all(np.allclose(camera.distortion[:5], lens) for camera in found.values())
+
     @pytest.mark.parametrize(
         ("changes", "problem"),
         [

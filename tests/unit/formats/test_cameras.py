@@ -31,6 +31,32 @@ class TestReadCameras:
         assert read_cameras(tmp_path, report) == {"00002": camera, "00005": camera}
         assert (report.read, report.imported, report.problems) == (2, 2, [])
 
+    def test_files_that_are_not_read_beside_others_are_named(
+        self, tmp_path: Path, camera: Camera, report: ReaderReport
+    ) -> None:
+        write_cameras(tmp_path, {"00002": camera})
+        for name in ("north.json", "south.npz", "track.json", "manifest.json", "notes.txt"):
+            (tmp_path / name).write_text("{}")
+        assert list(read_cameras(tmp_path, report)) == ["00002"]
+        (remark,) = report.remarks
+        assert "2 files are not read" in remark and "north.json, south.npz" in remark
+
+    def test_a_name_that_begins_with_a_line_is_a_camera_where_it_has_one(
+        self, tmp_path: Path, camera: Camera, report: ReaderReport
+    ) -> None:
+        value = {
+            "_DSC0001.jpg": camera_to_json(camera),
+            "_north": camera_to_json(camera),
+            "_DSC0002.jpg": {"pan": 3},
+            "_comment": "made by hand",
+            "_meta": {"software": "x"},
+        }
+        (tmp_path / "cameras.json").write_text(json.dumps(value))
+        assert set(read_cameras(tmp_path, report)) == {"_DSC0001", "_north"}
+        assert [problem.record for problem in report.problems] == ["_DSC0002.jpg"]
+        (remark,) = report.remarks
+        assert '"_comment", "_meta" holds no camera' in remark
+
     def test_files_in_match_folders_keep_their_match(
         self, tmp_path: Path, camera: Camera, report: ReaderReport, match: str
     ) -> None:

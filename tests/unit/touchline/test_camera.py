@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -153,6 +154,29 @@ class TestFromJson:
         del document["tilt_degrees"]
         with pytest.raises(CameraError, match="tilt_degrees"):
             Camera.from_json(document)
+
+    def test_a_matrix_that_is_null_is_none_and_numbers_may_be_text(self) -> None:
+        document = camera_to_json(MAIN)
+        usual = Camera.from_json({**document, "rotation_matrix": None})
+        text = {
+            name: list(map(repr, value)) if isinstance(value, list) else repr(value)
+            for name, value in document.items()
+            if name != "rotation_matrix"
+        }
+        assert Camera.from_json(text) == usual
+
+    @pytest.mark.parametrize(
+        ("name", "value"),
+        [
+            ("x_focal_length", "wide"), ("y_focal_length", [1.0]), ("position_meters", [1.0, 2.0]),
+            ("principal_point", None), ("pan_degrees", float("nan")), ("skew", "none"),
+            ("radial_distortion", [0.0, "a", 0, 0, 0, 0]), ("rotation_matrix", [1.0, 2.0, 3.0]),
+            ("rotation_matrix", 3.0),
+        ],
+    )  # fmt: skip
+    def test_what_is_no_number_is_named(self, name: str, value: Any) -> None:
+        with pytest.raises(CameraError, match=name):
+            Camera.from_json({**camera_to_json(MAIN), name: value})
 
 
 class TestLenses:

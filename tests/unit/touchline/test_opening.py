@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import unicodedata
 import zipfile
 import zlib
 from dataclasses import replace
@@ -28,6 +29,14 @@ from touchline.frames import FileFrames, ServerFrames
 def copy(export: Path, tmp_path: Path) -> Path:
     """An export to spoil."""
     return Path(shutil.copytree(export, tmp_path / "copy"))
+
+
+def _remove_utf_8_mark(path: Path) -> None:
+    """Take the mark for UTF-8 off the names of a zip, as many programs write them."""
+    content = bytearray(path.read_bytes())
+    for signature, at in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
+        content[content.index(signature) + at + 1] &= ~0x08
+    path.write_bytes(content)
 
 
 class TestOpen:
@@ -104,6 +113,36 @@ class TestFrames:
         (tmp_path / "empty").mkdir()
         with pytest.raises(DataError, match="has no frame"):
             touchline.open(bare, frames=tmp_path / "empty").views[0].frame()
+
+    @pytest.mark.parametrize("form", ["NFC", "NFD"])
+    @pytest.mark.parametrize("kind", ["folder", "archive", "zip", "unmarked zip", "windows zip"])
+    def test_they_are_found_however_their_names_are_written(
+        self, export: Path, tmp_path: Path, form: Any, kind: str
+    ) -> None:
+        other = {"NFC": "NFD", "NFD": "NFC"}[form]
+        names = [
+            unicodedata.normalize(
+                one, "liga/2030/K\u00f6ln 1 - 0 Ly\u00f3n/Frames-v3/caf\u00e9.png"
+            )
+            for one in (form, other)
+        ]
+        view = replace(touchline.open(export).views[0], file_name=names[0])
+        place = tmp_path / "frames"
+        if kind == "folder":
+            (place / names[1]).parent.mkdir(parents=True)
+            (place / names[1]).write_bytes(b"x")
+        elif kind == "archive":
+            match, _, image = names[1].partition("/Frames-v3/")
+            (place / match).mkdir(parents=True)
+            with zipfile.ZipFile(place / match / "Frames-v3.zip", "w") as archive:
+                archive.writestr(image, b"x")
+        else:
+            stored = names[1].replace("/", "\\") if kind == "windows zip" else names[1]
+            with zipfile.ZipFile(place, "w") as archive:
+                archive.writestr(stored, b"x")
+            if kind == "unmarked zip":
+                _remove_utf_8_mark(place)
+        assert FileFrames(place).read(view) == b"x"
 
     @pytest.mark.parametrize("as_stored", ["true", None])
     @pytest.mark.parametrize(

@@ -8,10 +8,11 @@ import cv2
 import numpy as np
 import pytest
 
-from app.errors import ReviewError
+from app.errors import InputError, ReviewError
 from app.features.file_tools.camera_export import export_cameras, key_by_frame_number
 from app.formats import camera_matrix
 from app.formats.camera_matrix import MOST_CAMERAS, MOST_ROWS
+from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
 from app.media.video import MAX_FRAMES
 from app.soccer.frames import ImageSize
@@ -140,10 +141,25 @@ class TestOpenTrackIO:
 
 class TestByFrame:
     def test_numbers_count_and_other_names_do_not(self) -> None:
-        assert key_by_frame_number({"00012": "a", "clip/7": "b", "north": "c", "²": "d"}) == {
-            12: "a",
-            7: "b",
-        }
+        report = ReaderReport()
+        cameras = {"00012": "a", "clip/7": "b", "north": "c", "²": "d"}
+        assert key_by_frame_number(cameras, Path("clip"), report) == {12: "a", 7: "b"}
+        assert [item.record for item in report.problems] == ['camera "north"', 'camera "²"']
+
+    def test_two_cameras_of_one_frame_are_refused(self, tmp_path: Path) -> None:
+        (tmp_path / "clips").mkdir()
+        for name in ("a", "b"):
+            folder_of(tmp_path / "clips" / name)
+        with pytest.raises(InputError, match='two cameras of frame 2, "a/00002" and "b/00002"'):
+            export_cameras(tmp_path / "clips", tmp_path / "out.npz", "npz")
+        assert not (tmp_path / "out.npz").exists()
+
+    def test_cameras_without_a_number_are_named(self, tmp_path: Path) -> None:
+        source = folder_of(tmp_path / "cameras")
+        write_cameras(source, {"north": CAMERAS[2]})
+        found = export_cameras(source, tmp_path / "out.npz", "npz")
+        assert found["cameras"] == 3
+        assert len(found["problems"]) == 1 and 'camera "north"' in found["problems"][0]
 
 
 class TestCommand:

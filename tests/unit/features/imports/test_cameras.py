@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import unicodedata
 from dataclasses import replace
 
 import numpy as np
@@ -39,6 +40,24 @@ class TestIngestCameras:
         assert (report.changed, report.problems) == (1, [])
         assert after.group.view("7_1.png").station.given == opposite
         assert (after.revision, after.solution) == (2, None)
+
+    @pytest.mark.parametrize(("view", "camera"), [("NFC", "NFD"), ("NFD", "NFC")])
+    def test_accents_may_be_composed_otherwise_in_the_name_of_a_camera(
+        self, store, fill, state, opposite, view, camera
+    ) -> None:
+        key, name = (unicodedata.normalize(form, "K\u00f6ln") for form in (view, camera))
+        group = state.group
+        own = replace(
+            group.views[0],
+            key=f"{key}.png",
+            station=replace(group.views[0].station, key=f"{group.match}/{key}.png"),
+        )
+        *_, group_id = fill(
+            replace(group, key=f"{group.match}/{key}.png", views=(own, *group.views[1:]))
+        )
+        report = attach(store, {name: opposite})
+        assert (report.changed, report.left_out.problems) == (1, [])
+        assert load_group_state(store, group_id).group.views[0].station.given == opposite
 
     def test_attaching_the_same_cameras_again_changes_nothing(self, store, state, opposite) -> None:
         attach(store, {"7": opposite})
