@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from app.formats.frame_names import frame_path_by_match, guess_frame_suffix, with_export_key
 from app.geometry.camera import Camera
 from app.soccer.ball_boxes import collect_ball_boxes, find_ball_fit, is_ball_3d_valid_in_view
-from app.soccer.frames import Box
+from app.soccer.frames import Box, box_to_corner_origin, clip_box
 from app.soccer.group import Group, View
 from app.soccer.solution import BallFit, Solution, ViewSolution
 
@@ -91,14 +91,17 @@ class ExportRecord:
         """Whether what a detector would learn from a view is what the view shows.
 
         A view that shows a ball and has no box would teach that there is none, also where every view
-        is asked for: its ball is only a point, or there are several to pick from.
+        is asked for: its ball is only a point, there are several to pick from, or its box lies
+        beside the picture.
 
         Args:
             view: One of the group's.
             boxes: One of ``BOX_KINDS``.
             every_view: Whether views count from which no detector should learn (``is_training_view``).
         """
-        if _shows_ball(view) and choose_ball_box(self, view, boxes) is None:
+        box = choose_ball_box(self, view, boxes)
+        inside = box is not None and clip_box(box_to_corner_origin(box), view.size) is not None
+        if _shows_ball(view) and not inside:
             return False
         return every_view or self.is_training_view(view)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
@@ -21,7 +20,7 @@ from app.formats.frame_names import (
 )
 from app.formats.view_files import PutText, make_disk_writer
 from app.json_text import json_text
-from app.soccer.frames import Box, ImageSize, box_to_corner_origin
+from app.soccer.frames import Box, ImageSize, box_to_corner_origin, clip_box
 from app.soccer.group import View
 from app.wording import plural
 
@@ -161,7 +160,8 @@ def write_yolo(
 ) -> dict[str, int]:
     """Write labels, lists and ``data.yaml`` below an existing folder.
 
-    A label file that is empty says "no ball here": views that show a ball without a box are left out.
+    A label file that is empty says "no ball here": views that show a ball without a box in their
+    picture are left out.
     Boxes are clipped at the image border. Where no split validates, some of what trains is held
     out; what tests never validates. ``frames.csv`` says which image is which view, and
     whether it is there: a frame that was not copied must be put under its name before training.
@@ -236,10 +236,10 @@ def format_yolo_label(box: Box, size: ImageSize) -> str | None:
         >>> format_yolo_label(Box(192.0, 54.0, 96.0, 54.0), ImageSize(960, 540))
         '0 0.25 0.15 0.1 0.1'
     """
-    left, right = max(box.x, 0.0), min(box.x + box.width, float(size.width))
-    top, bottom = max(box.y, 0.0), min(box.y + box.height, float(size.height))
-    if not all(map(math.isfinite, (left, right, top, bottom))) or right <= left or bottom <= top:
+    part = clip_box(box, size)
+    if part is None:
         return None
+    left, top, right, bottom = part
     numbers = (
         (left + right) / 2 / size.width,
         (top + bottom) / 2 / size.height,

@@ -85,3 +85,15 @@ def box_from_corner_origin(box: Box) -> Box:
 def box_to_corner_origin(box: Box) -> Box:
     """The inverse of ``box_from_corner_origin``."""
     return Box(box.x + HALF, box.y + HALF, box.width, box.height)
+
+
+def clip_box(box: Box, size: ImageSize) -> tuple[float, float, float, float] | None:
+    """Left, top, right and bottom of the part of a box in the image, pixels; None where there is none.
+
+    Both are measured from the corner of the first pixel.
+    """
+    left, right = max(box.x, 0.0), min(box.x + box.width, float(size.width))
+    top, bottom = max(box.y, 0.0), min(box.y + box.height, float(size.height))
+    if not all(map(math.isfinite, (left, right, top, bottom))) or right <= left or bottom <= top:
+        return None
+    return left, top, right, bottom

@@ -48,6 +48,19 @@ class TestLabelLine:
 
 
 class TestWriteYolo:
+    @pytest.mark.parametrize("every_view", [False, True])
+    def test_a_ball_whose_box_lies_beside_its_picture_teaches_nothing(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, every_view: bool
+    ) -> None:
+        group = soccer_group()
+        beside = BallAnnotation(box=Box(1279.5, 300.0, 12.0, 11.0))
+        group = group.with_view(replace(group.views[1], balls=(beside,)))
+        counts = write_yolo(tmp_path, [solved(group)], boxes="annotated", every_view=every_view)
+        assert (counts["labels"], counts["boxes"], counts["views_left_out"]) == (1, 1, 1)
+        (label,) = (tmp_path / "labels").rglob("*.txt")
+        assert label.read_text().startswith("0 ")
+        assert len((tmp_path / "frames.csv").read_text().splitlines()) == 2
+
     def test_labels_lists_and_data_belong_together(
         self, tmp_path: Path, solved: Solved, soccer_group: Make
     ) -> None:
