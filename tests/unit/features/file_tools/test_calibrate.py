@@ -1,5 +1,6 @@
 import json
 import math
+import unicodedata
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -117,6 +118,13 @@ class TestCalibrateFiles:
         assert summary["calibrated"] == 3
         assert "broken" in {item["frame"] for item in summary["failed"]}
         assert "broken.json" in summary["problems"][0]
+
+    def test_a_camera_is_that_of_its_lines_however_accents_are_composed(self, tmp_path):
+        lines = write(tmp_path / "lines", **{unicodedata.normalize("NFC", "Köln"): click(MAIN)})
+        run(lines, tmp_path / "out")
+        (camera,) = (tmp_path / "out").glob("camera_*.json")
+        camera.rename(camera.with_name(unicodedata.normalize("NFD", camera.name)))
+        assert score_camera_files(lines, tmp_path / "out", size=SIZE)["completeness"] == 1.0
 
     def test_a_bad_point_fails_no_frame(self, tmp_path):
         source = tmp_path / "lines"
