@@ -89,7 +89,7 @@ def write_parquet(
                 row = _make_row(record, view, position, boxes, everything)
                 waiting.append(replace_non_finite(row | said))
                 counts["views"] += 1
-                counts["boxes"] += row["box_x"] is not None
+                counts["boxes"] += "box_x" in row
                 counts["balls"] += record.has_ball_3d(view)
             if len(waiting) >= ROWS:
                 writer.write_table(pyarrow.Table.from_pylist(waiting, schema))
