@@ -131,7 +131,7 @@ class Settings(BaseSettings):
     """Or a file with that address, which only its owner may read (``chmod 600``)."""
     host: str = "127.0.0.1"
     """Address the server listens on."""
-    port: int = 8000
+    port: int = Field(default=8000, ge=0, le=65535)
     """Port the server listens on."""
     allowed_hosts: list[str] = ["127.0.0.1", "localhost", "[::1]"]
     """Host headers the server answers to, without the port."""
@@ -197,7 +197,7 @@ class Settings(BaseSettings):
     """Or a file with that password, which only its owner may read (``chmod 600``)."""
     smtp_from: str | None = None
     """Sender address of mails, such as touchline@example.org."""
-    workers: int = Field(default_factory=lambda: os.cpu_count() or 1)
+    workers: int = Field(default_factory=lambda: os.cpu_count() or 1, ge=1)
     """Processes that solve in batches."""
     web_workers: int = Field(default=1, ge=1, le=64)
     """Processes that answer requests; more than one only on PostgreSQL."""
@@ -209,21 +209,21 @@ class Settings(BaseSettings):
     authenticate each other."""
     image_workers: int = Field(default_factory=lambda: min(os.cpu_count() or 1, 4), ge=1)
     """Processes that make pictures of frames."""
-    max_upload_bytes: int = 8 * 1024**3
+    max_upload_bytes: int = Field(default=8 * 1024**3, ge=1)
     """Largest uploaded file, such as the recording of a match; a JSON body is smaller still."""
-    upload_days: int = 7
+    upload_days: int = Field(default=7, ge=0)
     """Days after which an uploaded file is deleted, unless a dataset reads frames from it."""
     upload_quota_bytes: int = Field(default=20 * 1024**3, ge=0)
     """Bytes that the uploads of one person may use together on a team's server; 0: no limit."""
     export_days: int = Field(default=0, ge=0)
     """Days after which the file of a finished export is deleted; 0: never. The export of a
     version can be made again; other exports would have the present state of the dataset."""
-    answer_bytes: int = 64 * 2**20
+    answer_bytes: int = Field(default=64 * 2**20, ge=0)
     """Space for responses stored under Idempotency-Keys; beyond it the oldest lose their
     content, not their key."""
-    job_days: int = 90
+    job_days: int = Field(default=90, ge=0)
     """Days after which a job that has ended is deleted, unless it made an export."""
-    cache_days: int = 30
+    cache_days: int = Field(default=30, ge=0)
     """Days after which a derived image is made again."""
     import_folders: Annotated[list[Path], NoDecode] = []
     """Folders below which imports over REST may read, separated by ``:`` (or a JSON list)."""
@@ -233,17 +233,19 @@ class Settings(BaseSettings):
     store_cache_bytes: int = Field(default=4 * 1024**3, ge=2**26)
     """Space for frames of object stores that are cached on this disk; the least recently used
     are deleted first."""
-    max_file_bytes: int = 256 * 1024 * 1024
+    max_file_bytes: int = Field(default=256 * 1024 * 1024, ge=1)
     """Largest single data file (JSON, XML, CSV) that an importer reads."""
-    import_memory: int = Field(default_factory=lambda: min(4 * 1024**3, find_memory_limit() // 2))
+    import_memory: int = Field(
+        default_factory=lambda: min(4 * 1024**3, find_memory_limit() // 2), ge=1
+    )
     """Bytes of memory that an import over REST may use."""
-    import_seconds: int = 3600
+    import_seconds: int = Field(default=3600, ge=1)
     """Seconds of processor time that an import over REST may take."""
-    max_members: int = 200_000
+    max_members: int = Field(default=200_000, ge=1)
     """Most members of an archive."""
-    max_pixels: int = 50_000_000
+    max_pixels: int = Field(default=50_000_000, ge=1)
     """Most pixels of an image, checked before it is decoded."""
-    max_side: int = 16_384
+    max_side: int = Field(default=16_384, ge=1)
     """Longest side of an image, pixels, checked before it is decoded."""
 
     @field_validator("import_folders", mode="before")

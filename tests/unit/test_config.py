@@ -5,9 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import typer
 
 from app.config import Settings, find_memory_limit, is_local
 from app.errors import InputError
+from app.terminal.options import read_settings
 
 MB = 2**20
 
@@ -41,6 +43,34 @@ def test_without_a_limit_it_is_the_machines(tmp_path: Path) -> None:
     (own := tmp_path / "cgroup").write_text("0::/\n")
     (tmp_path / "memory.max").write_text("max\n")
     assert find_memory_limit(own, tmp_path) == find_memory_limit(tmp_path / "none") > 256 * MB
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *((name, 0) for name in ("workers", "image_workers", "max_upload_bytes", "max_file_bytes")),
+        *((name, 0) for name in ("import_memory", "import_seconds", "max_members", "max_side")),
+        *((name, -1) for name in ("upload_days", "export_days", "job_days", "cache_days")),
+        *((name, -1) for name in ("answer_bytes", "max_pixels", "port")),
+        ("port", 65536),
+    ],
+)
+def test_a_number_out_of_bounds_is_wrong_usage(
+    name: str, value: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(f"TOUCHLINE_{name.upper()}", str(value))
+    with pytest.raises(typer.BadParameter, match=f"TOUCHLINE_{name.upper()}"):
+        read_settings()
+
+
+def test_every_number_has_bounds() -> None:
+    numbers = {
+        name
+        for name, field in Settings.model_fields.items()
+        if field.annotation in (int, float, int | None)
+    }
+    assert "workers" in numbers
+    assert not {name for name in numbers if not Settings.model_fields[name].metadata}
 
 
 class TestDatabaseUrlFile:
