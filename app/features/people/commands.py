@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from app.errors import InputError
 from app.terminal.options import Json, get_current_actor, read_settings
 from app.terminal.server import open_store
 from app.terminal.terminal import print_json, print_values, say
@@ -66,7 +67,11 @@ def invite_many(
     from app.features.people.invitations import invite_many as invite
     from app.features.people.invitations import parse_invitation_list
 
-    rows, post = parse_invitation_list(file.read()), _make_mailer()
+    try:
+        text = file.read()
+    except UnicodeDecodeError as error:
+        raise InputError(f"{file.name} is not UTF-8 text", hint="Save it as CSV UTF-8.") from error
+    rows, post = parse_invitation_list(text), _make_mailer()
     with open_store() as store:
         report = invite(store, rows, post, actor=get_current_actor(), dry_run=dry_run)
     refused = sum(row.state == "refused" for row in report)

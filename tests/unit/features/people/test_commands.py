@@ -17,7 +17,7 @@ from typer.testing import CliRunner, Result
 from app.command_line import app
 from app.config import Settings
 from app.db.store import Store
-from app.errors import ConflictError, NotLoggedInError
+from app.errors import ConflictError, InputError, NotLoggedInError
 from app.features.audit.queries import AuditQuery
 from app.features.audit.service import read_audit
 from app.features.imports.ingest import ensure_dataset
@@ -110,6 +110,13 @@ class TestUsers:
         assert '"boss" is not a role' in done.stdout
         links.set_password_by_link(store, token_in(done.stdout), SECRET)
         assert found(LoginSessions(store), "anna").role is Role.LEAD
+
+    def test_a_list_that_is_no_utf8_is_named(self, tmp_path: Path) -> None:
+        file = tmp_path / "people.csv"
+        file.write_bytes("name,role\nJosé,lead\n".encode("latin-1"))
+        with pytest.raises(InputError, match=r"people\.csv is not UTF-8 text") as refused:
+            CliRunner().invoke(app, ["users", "invite-many", str(file)], catch_exceptions=False)
+        assert "CSV UTF-8" in (refused.value.hint or "")
 
     def test_the_list_says_where_everybody_is(self, store: Store) -> None:
         for name in ("anna", "bob"):
