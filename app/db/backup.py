@@ -38,7 +38,7 @@ from app.db.recovery.anchor import (
     compute_anchor_from_database,
     require_own_database,
 )
-from app.db.recovery.preopen_check import list_signs_of_use, require_consistent_home_files
+from app.db.recovery.preopen_check import require_consistent_home_files, require_database
 from app.db.session import Session, now
 from app.durable import PARTIAL, sync_to_disk
 from app.errors import EXAMINE, DamagedError, InputError, StorageError
@@ -94,11 +94,7 @@ def back_up_home(settings: Settings, out: Path, folders: Sequence[str] = ()) -> 
         InputError: The home has no database, or it is a server's.
     """
     require_file_database(settings, "backed up", "pg_dump --format=custom --file=OUT DATABASE")
-    if not settings.database_file.exists() and not list_signs_of_use(settings):
-        raise InputError(
-            f"there is no database in {settings.home}",
-            hint="Set TOUCHLINE_HOME to the home folder of an installation.",
-        )
+    require_database(settings, "Set TOUCHLINE_HOME to the home folder of an installation.")
     lock = DatabaseOpenLock(settings)
     try:
         if lock.alone:

@@ -32,7 +32,7 @@ from app.config import Settings
 from app.db.dialects.dialect import make_engine, translate_storage_errors
 from app.db.home import ASIDE, KEYS
 from app.db.recovery.anchor import read_anchor, require_own_database
-from app.errors import DamagedError, StorageError
+from app.errors import DamagedError, InputError, StorageError
 
 MAGIC = b"SQLite format 3\0"
 _HEADER_BYTES = 100
@@ -299,6 +299,12 @@ def _require_unused_home(settings: Settings) -> None:
             hint="Run touchline restore BACKUP. To begin anew, set TOUCHLINE_HOME to another"
             " folder, or move this one away.",
         )
+
+
+def require_database(settings: Settings, hint: str) -> None:
+    """Raise InputError unless a home has a database, or signs that it had one; makes nothing."""
+    if not settings.database_file.exists() and not list_signs_of_use(settings):
+        raise InputError(f"there is no database in {settings.home}", hint=hint)
 
 
 def list_signs_of_use(settings: Settings) -> list[str]:

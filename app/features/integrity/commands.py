@@ -24,11 +24,15 @@ def doctor(
     json_: Json = False,
 ) -> None:
     """Look whether home and database are whole: what the log tells of, and what was computed; 1 if not."""
+    from app.db.dialects.dialect import get_dialect
     from app.db.locks import hold_server_lock
+    from app.db.recovery.preopen_check import require_database
     from app.features.groups.replay import rebuild_tables
     from app.features.integrity.checks import examine_everything
 
     settings = read_settings()
+    if get_dialect(settings).is_file:
+        require_database(settings, "Set TOUCHLINE_HOME to the home folder of an installation.")
     if rebuild:
         with hold_server_lock(settings), open_store(settings) as store:
             for sentence in rebuild_tables(store):

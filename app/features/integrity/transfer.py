@@ -41,6 +41,7 @@ from app.db.locks import hold_exclusive_database_lock, hold_server_lock
 from app.db.log import verify_chain
 from app.db.migrate import UNFINISHED, apply_missing_migrations, read_schema_revision
 from app.db.recovery.anchor import compute_anchor_from_database
+from app.db.recovery.preopen_check import require_database
 from app.db.session import Session
 from app.db.store import Store
 from app.durable import read_private_file
@@ -195,7 +196,7 @@ def transfer_database(
         replace_null: Write U+FFFD where texts of the source hold U+0000.
 
     Raises:
-        InputError: They are the same, the target holds something else, or texts of the source
+        InputError: They are the same, the source has no database, the target holds something else, or texts of the source
             hold U+0000 and are not to be replaced.
         StorageError: A server runs, or one of them cannot be read or written.
         DamagedError: The source is damaged, or the copy is not equal to it.
@@ -204,6 +205,8 @@ def transfer_database(
         raise InputError(
             "source and target are the same database", hint="Name a target other than the source."
         )
+    if get_dialect(source).is_file:
+        require_database(source, "Name the home folder of an installation as FROM.")
     dialect = get_dialect(target)
     with ExitStack() as held:
         held.enter_context(hold_server_lock(source))

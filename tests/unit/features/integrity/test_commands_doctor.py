@@ -44,6 +44,16 @@ class TestDoctor:
         mended_by = "touchline restore" if get_dialect(settings).is_file else "pg_restore"
         assert (fault["name"], mended_by in fault["advice"]) == ("datasets", True)
 
+    @pytest.mark.file_of_sqlite("a home without one")
+    def test_a_home_without_a_database_is_refused_and_not_made(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setenv("TOUCHLINE_HOME", str(tmp_path / "hoem"))
+        refused = CliRunner().invoke(app, ["doctor"])
+        assert refused.exit_code == 1
+        assert "there is no database in" in str(refused.exception)
+        assert not (tmp_path / "hoem").exists()
+
     def test_rebuilding_waits_for_no_server(self, settings: Settings) -> None:
         assert CliRunner().invoke(app, ["doctor", "--rebuild"]).exit_code == 0
         with hold_server_lock(settings):

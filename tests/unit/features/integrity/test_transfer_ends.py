@@ -8,7 +8,7 @@ import pytest
 
 from app.config import Settings
 from app.errors import InputError
-from app.features.integrity.transfer import make_settings_of_both_databases
+from app.features.integrity.transfer import make_settings_of_both_databases, transfer_database
 
 ADDRESS = "postgresql://ann:secret@db/touchline"
 
@@ -43,6 +43,15 @@ def test_a_database_that_goes_into_a_home_makes_a_new_home(
     )
     assert begin.database_url == "postgresql://db/touchline"
     assert (end.home, end.database_url) == (tmp_path / "new", None)
+
+
+def test_a_home_without_a_database_is_refused_and_not_made(
+    settings: Settings, tmp_path: Path
+) -> None:
+    ends = make_settings_of_both_databases(str(tmp_path / "hoem"), str(tmp_path / "new"), settings)
+    with pytest.raises(InputError, match=r"there is no database in .*hoem"):
+        transfer_database(*ends)
+    assert not (tmp_path / "hoem").exists() and not (tmp_path / "new").exists()
 
 
 @pytest.mark.parametrize("address", [ADDRESS, "postgresql://db/touchline?user=ann&password=secret"])
