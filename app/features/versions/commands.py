@@ -78,6 +78,10 @@ def freeze(
     from app.features.versions.freeze import freeze_dataset as run_freeze
     from app.soccer.split import Split
 
+    if name and named:
+        raise typer.BadParameter("give the name once: as NAME or as --name")
+    if licence and licence_file is not None:
+        raise typer.BadParameter("give the licence once: --licence or --licence-file")
     cameras = tuple(f"cam{number}" for number in sorted(parse_cameras(test_cameras)))
     chosen = Split(split, seed, test_share, cameras)
     text = licence if licence_file is None else read_text(licence_file, MAX_LICENCE)

@@ -51,6 +51,18 @@ class TestFreeze:
         assert (code, json.loads(out)["groups"]) == (0, 0)
         assert len(run("versions", "--dataset", "demo")[1].splitlines()) == 2
 
+    @pytest.mark.parametrize(
+        "words", [("a", "--name", "b"), ("--licence", "CC0", "--licence-file")]
+    )
+    def test_two_options_that_contradict_each_other_are_refused(
+        self, run: Run, frozen: Path, tmp_path: Path, words: tuple[str, ...]
+    ) -> None:
+        (file := tmp_path / "licence.txt").write_text("CC BY 4.0")
+        given = (*words, file) if words[-1] == "--licence-file" else words
+        code, _, err = run("freeze", "--dataset", "demo", *given, "--dry-run")
+        assert code == 2
+        assert "once" in err
+
     def test_a_licence_file_that_is_no_text_is_one_sentence(
         self, run: Run, frozen: Path, tmp_path: Path
     ) -> None:
