@@ -417,6 +417,7 @@ def evaluate(
     """
     if predictions is None and reference is None and cameras is None:
         raise typer.BadParameter("name predictions, --cameras or --reference")
+    from app.features.file_tools.out_folder import require_writable_folder
     from app.features.predictions.evaluation_run import EvaluationRequest, SourcesEvaluationRequest
     from app.features.predictions.reader import PredictionFiles
 
@@ -429,6 +430,8 @@ def evaluate(
         version,
     )
     request.refuse_unused_options()
+    if out is not None:
+        require_writable_folder(out)
     server = get_current_server()
     run = _evaluate_locally if server is None else partial(_evaluate_on_server, server)
     with show_progress("Evaluating") as progress:

@@ -201,8 +201,16 @@ def get_predictions(store: Store, set_id: int) -> PredictionSet:
         return read_set(session, set_id)
 
 
-def find_predictions(store: Store, dataset: str | int, name: str) -> PredictionSet:
+def find_predictions(
+    store: Store, dataset: str | int, name: str, *, or_file: bool = False
+) -> PredictionSet:
     """The set of a dataset with that name or id.
+
+    Args:
+        store: The database.
+        dataset: Name or id.
+        name: Of the set, or its id.
+        or_file: Whether the name could have been that of a file; the error says so.
 
     Raises:
         NotFoundError: There is none; the hint names those that there are.
@@ -211,9 +219,10 @@ def find_predictions(store: Store, dataset: str | int, name: str) -> PredictionS
     found = next((item for item in known if name in (item.name, str(item.id))), None)
     if found is None:
         names = ", ".join(item.name for item in known[:10])
+        either = "file and no set" if or_file else "set"
         raise NotFoundError(
-            f'there is no file and no set of predictions "{name}"',
-            hint=f"Sets: {names}." if names else None,
+            f'there is no {either} of predictions "{name}"',
+            hint=f"Sets: {names}." if names else "The dataset has no set of predictions yet.",
         )
     return found
 

@@ -10,6 +10,7 @@ from typer.testing import CliRunner, Result
 from app.command_line import app
 from app.config import Settings
 from app.db.store import Store
+from app.errors import NotFoundError
 from app.features.imports.ingest import import_groups
 from app.features.predictions.evaluation import parse_run_tables
 from app.features.solutions.service import solve_dataset
@@ -36,6 +37,15 @@ def home(tmp_path_factory: pytest.TempPathFactory, scenes) -> Path:
     solve_dataset(store, "small")
     store.close()
     return home / "home"
+
+
+def test_accept_names_the_sets_that_there_are(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TOUCHLINE_HOME", str(home))
+    with pytest.raises(NotFoundError) as refused:
+        words = ["accept", "--dataset", "small", "nosuch"]
+        CliRunner().invoke(app, words, catch_exceptions=False)
+    assert refused.value.message == 'there is no set of predictions "nosuch"'
+    assert refused.value.hint is not None and "set" in refused.value.hint
 
 
 @pytest.fixture
@@ -132,6 +142,13 @@ class TestEvaluate:
         document = json.loads(swapped.stdout)
         table = next(item for item in document["tables"] if item["name"] == "boxes")
         assert {row["name"]: row["cells"][0]["value"] for row in table["rows"]}["detected"] > 0.99
+
+    def test_a_file_in_the_place_of_the_folder_is_refused_before_the_work(
+        self, run, truth, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("app.features.predictions.commands._evaluate_locally", pytest.fail)
+        done = run("evaluate", "--dataset", "small", str(truth), "--out", str(truth))
+        assert "is a file; name a folder" in str(done.exception)
 
     def test_writes_tables_and_figures_into_a_folder(self, run, truth, tmp_path) -> None:
         out = tmp_path / "out"
