@@ -163,7 +163,7 @@ def run() -> None:
         name = quote_text(str(error.filename), SHOWN)
         if isinstance(error, PermissionError):
             print_error(
-                f"this user has no permission to read {name}",
+                f"this user has no permission to use {name}",
                 "Give this user access (chmod, chown), or run the command as another user.",
             )
         else:

@@ -48,6 +48,12 @@ class ReaderReport:
         """The same from its parts."""
         self.add_problem(DatasetFormatError(path, record, where, problem))
 
+    def add_problems_of(self, other: ReaderReport) -> None:
+        """Note what another reader left out."""
+        for error in other.problems:
+            self.add_problem(error)
+        self.dropped += other.dropped
+
     def add_remark(self, sentence: str) -> None:
         """Say once what was decided, or what there is besides."""
         if sentence not in self.remarks and len(self.remarks) < MAX_REMARKS:

@@ -177,12 +177,15 @@ def write_recording(
         progress: Called with (frames done, frames in all).
 
     Raises:
-        InputError: The recording would be too short, or its name has no ending of a video.
+        InputError: The recording would be too short, its name has no ending of a video, or is that
+            of a folder.
     """
     if out.suffix.lower() not in (".mp4", ".avi", ".mkv"):
         raise InputError(
             f"{out.name} does not end in .mp4, .avi or .mkv", hint="Choose a name such as film.mp4."
         )
+    if out.is_dir():
+        raise InputError(f"{out} is a folder; name a file, such as {out / 'film.mp4'}")
     play, shots = _plan_recording(list(parts) if parts else plan_shots(seconds), seed, since)
     total = shots[-1].last + 1
     out.parent.mkdir(parents=True, exist_ok=True)

@@ -94,20 +94,26 @@ def write_sample(
         workers: Processes; None for one per processor.
 
     Raises:
-        InputError: ``groups`` or ``seed`` is not usable, or ``out`` is a file.
+        InputError: ``groups`` or ``seed`` is not usable, or ``out`` is a file or cannot be
+            written.
     """
     if groups < 1 or seed < 0:
         raise InputError("a sample needs at least one group and a seed of 0 or more")
     if out.exists() and not out.is_dir():
-        raise InputError(f"{out} is a file; the sample needs a folder")
+        raise InputError(f"{out} is a file; name a folder")
     counts = group_counts_by_match(groups)
-    with _open_staging_folder(out) as folder:
-        whole = [_GroupsJob(i, n, 0, n, seed, faults, folder) for i, n in enumerate(counts)]
-        with _open_job_runner(workers, len(whole) if labels_only else groups) as run:
-            # With frames, drawing them is nearly all of the work, so it alone is reported.
-            report = _write_labels(folder, whole, run, groups, progress if labels_only else None)
-            if not labels_only:
-                _write_frames(folder, whole, run, groups, progress)
+    try:
+        with _open_staging_folder(out) as folder:
+            whole = [_GroupsJob(i, n, 0, n, seed, faults, folder) for i, n in enumerate(counts)]
+            with _open_job_runner(workers, len(whole) if labels_only else groups) as run:
+                # With frames, drawing them is nearly all of the work, so it alone is reported.
+                report = _write_labels(
+                    folder, whole, run, groups, progress if labels_only else None
+                )
+                if not labels_only:
+                    _write_frames(folder, whole, run, groups, progress)
+    except OSError as error:
+        raise InputError(f"{out} cannot be written ({error.strerror})") from error
     return report
 
 

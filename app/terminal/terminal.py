@@ -8,7 +8,7 @@ import math
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from threading import Event
 from typing import Any, TypeVar
@@ -20,6 +20,8 @@ Row = TypeVar("Row")
 
 INTERRUPTED = 130
 """Exit code of what Ctrl+C ended, as shells have it."""
+MAX_PROBLEMS = 10
+"""Problems that are printed one by one."""
 MAX_MISSING = 20
 """Missing images that are named in a table."""
 # Steering characters of terminals (C0 and C1), and those that turn the direction of writing.
@@ -127,6 +129,14 @@ def print_error(message: str, hint: str | None = None) -> None:
         print(escape_controls(hint), file=sys.stderr)  # noqa: T201
 
 
+def print_problems(problems: Sequence[str]) -> None:
+    """What could not be read, on stderr; ``--json`` has all of it."""
+    for problem in problems[:MAX_PROBLEMS]:
+        print_error(problem)
+    if len(problems) > MAX_PROBLEMS:
+        print_error(f"... and {len(problems) - MAX_PROBLEMS} more problems; --json names all")
+
+
 def say(line: str) -> None:
     """A line of the result, at once."""
     print(escape_controls(line), flush=True)  # noqa: T201
@@ -199,5 +209,7 @@ def _value_text(value: Any) -> str:
     if isinstance(value, dict):
         return ", ".join(f"{name} {_value_text(item)}" for name, item in value.items()) or "none"
     if isinstance(value, (list, tuple)):
+        if value and all(isinstance(item, float) for item in value):
+            return " ".join(map(_value_text, value))
         return str(len(value))
     return "none" if replace_non_finite(value) is None else str(value)

@@ -151,8 +151,32 @@ class TestClosed:
         monkeypatch.setattr("app.features.file_tools.calibrate.score_camera_files", refuse)
         code, _, err = run("score", line_files, line_files)
         assert code == 1
-        assert re.search(r"has no permission to read \W?/srv/closed/x\.json", err)
+        assert re.search(r"has no permission to use \W?/srv/closed/x\.json", err)
         assert "Traceback" not in err
+
+
+class TestOut:
+    @pytest.mark.parametrize(
+        "words",
+        [
+            ("calibrate", "IN", "OUT"),
+            ("propose", "IN", "OUT"),
+            ("snap", "IN", "IN", "OUT"),
+            ("link", "IN", "IN", "OUT"),
+            ("cameras", "IN", "OUT", "--format", "opentrackio"),
+            ("shots", "FILE", "OUT"),
+            ("track", "FILE", "OUT"),
+        ],
+        ids=lambda words: words[0],
+    )
+    def test_a_file_in_the_place_of_the_folder_is_refused_before_the_work(
+        self, run: Run, line_files: Path, tmp_path: Path, words: tuple[str, ...]
+    ) -> None:
+        (out := tmp_path / "out").write_text("")
+        places = {"IN": line_files, "OUT": out, "FILE": line_files / "00001.json"}
+        code, _, err = run(*(places.get(word, word) for word in words))
+        assert code == 1
+        assert err == f"{out} is a file; name a folder\n"
 
 
 class TestNames:

@@ -22,7 +22,9 @@ from app.features.file_tools.matches import (
     collect_camera_places_of_other_frames,
     map_points_to_original_pictures,
     read_match_of_each_frame,
+    require_named_frame,
 )
+from app.features.file_tools.out_files import require_writable_folder
 from app.formats.cameras import camera_file_name, format_camera_file, read_cameras
 from app.formats.frame_names import compose_name, strip_image_suffix
 from app.formats.json_reader import read_json
@@ -115,10 +117,12 @@ def calibrate_files(
         What ``calibrate.json`` holds.
 
     Raises:
-        InputError: There is no line file, or ``out`` cannot hold the result.
+        InputError: There is no line file, ``matches`` names none of the frames, or ``out`` cannot
+            hold the result.
     """
     began = time.perf_counter()
-    report = ReaderReport()
+    require_writable_folder(out)
+    report, of_matches = ReaderReport(), ReaderReport()
     files = list(read_line_files(source, size, report))
     if not files:
         raise report.make_refusal_error(f"{source} contains no line files")
@@ -127,7 +131,10 @@ def calibrate_files(
     if picture is not None or guess_picture:
         geometry, picture_summary = choose_picture_geometry(files, size, picture)
         files = map_points_to_original_pictures(files, geometry)
-    named = None if matches is None else read_match_of_each_frame(matches)
+    named = None
+    if matches is not None:
+        named = read_match_of_each_frame(matches, of_matches)
+        require_named_frame(named, [file.stem for file in files], matches)
     sharing = guess or named is not None
     policy = replace(CLICKED, goal=goal, check_labels=labels == "checked", lone_frames="any")
     chunks = [files[start : start + CHUNK] for start in range(0, len(files), CHUNK)]
@@ -152,7 +159,7 @@ def calibrate_files(
         shares = collect_camera_places_of_other_frames(
             files, [frame.place for frame in frames], named
         )
-        groups = len({share.match for share in shares})
+        groups = len({share.match for share in shares if share.match})
         jobs = []
         for start in range(0, len(files), CHUNK):
             piece = slice(start, start + CHUNK)
@@ -166,6 +173,7 @@ def calibrate_files(
     frames = [_map_frame_to_given_picture(frame, geometry, size) for frame in frames]
     lost = _find_frames_without_lines(source, files, report)
     summary = _make_summary(frames, lost, report, time.perf_counter() - began)
+    summary["problems"] += [problem.message for problem in of_matches.problems]
     if sharing:
         summary["matches"] = groups
     if picture_summary is not None:

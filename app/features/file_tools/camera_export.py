@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from app.durable import replace_file
 from app.errors import DatasetFormatError, InputError
+from app.features.file_tools.out_files import require_writable_folder, write_out_file
 from app.formats.camera_matrix import cameras_to_arrays
 from app.formats.cameras import read_cameras
 from app.formats.opentrackio_writer import (
@@ -43,9 +43,15 @@ def export_cameras(
         Counts: ``cameras``, ``first`` and ``last`` frame, ``missing`` frames between; ``problems``.
 
     Raises:
-        InputError: There is no camera of a frame, or no size.
+        InputError: There is no camera of a frame, no size, or ``out`` cannot be written.
         DatasetFormatError: A camera is none that the format can say.
     """
+    if kind != "npz":
+        require_writable_folder(out)
+    elif out.is_dir():
+        raise InputError(f"{out} is a folder; name a file, such as {out / 'cameras.npz'}")
+    else:
+        require_writable_folder(out.parent)
     report = ReaderReport()
     sizes: dict[str, ImageSize] = {}
     found = read_cameras(source, report, sizes=sizes)
@@ -56,8 +62,7 @@ def export_cameras(
         content = io.BytesIO()
         arrays: dict[str, Any] = dict(cameras_to_arrays(cameras, source.resolve().name))
         np.savez_compressed(content, **arrays)
-        out.parent.mkdir(parents=True, exist_ok=True)
-        replace_file(out, content.getvalue())
+        write_out_file(out, content.getvalue())
     else:
         known = key_by_frame_number(sizes, source, ReaderReport())
         _write_opentrackio_samples(source, out, cameras, known, size)
@@ -132,9 +137,8 @@ def _write_opentrackio_samples(
             rate=rate,
             status=outcome if isinstance(outcome, str) and outcome else None,
         )
-    out.mkdir(parents=True, exist_ok=True)
     for name, sample in samples.items():
-        replace_file(out / name, (json_text(sample, indent=1) + "\n").encode())
+        write_out_file(out / name, json_text(sample, indent=1) + "\n")
 
 
 def _read_track_rows(source: Path) -> dict[int, dict[str, Any]]:

@@ -10,7 +10,14 @@ import typer
 from app.soccer.choices import GoalEdge
 from app.soccer.frames import ImageSize
 from app.terminal.options import Json, Size, Workers, parse_size, read_settings
-from app.terminal.terminal import print_error, print_json, print_values, say, show_progress
+from app.terminal.terminal import (
+    print_error,
+    print_json,
+    print_problems,
+    print_values,
+    say,
+    show_progress,
+)
 from app.wording import plural
 
 commands = typer.Typer()
@@ -18,10 +25,6 @@ commands = typer.Typer()
 LineFiles = Annotated[
     Path, typer.Argument(metavar="IN", exists=True, help="Folder or zip of line files.")
 ]
-
-
-PROBLEMS = 10
-"""Problems that are printed one by one."""
 
 
 @commands.command()
@@ -86,21 +89,13 @@ def calibrate(
             progress=progress,
         )
     print_values(result, json_)
-    _print_problems(result["problems"])
+    print_problems(result["problems"])
     if not result["calibrated"]:
         first = result["failed"][0]
         print_error(
             f"none of {plural(result['frames'], 'frame')} could be calibrated: {first['frame']}: {first['reason']}"
         )
         raise typer.Exit(1)
-
-
-def _print_problems(problems: list[str]) -> None:
-    """What could not be read, on stderr; ``--json`` has all of it."""
-    for problem in problems[:PROBLEMS]:
-        print_error(problem)
-    if len(problems) > PROBLEMS:
-        print_error(f"... and {len(problems) - PROBLEMS} more problems; --json names all")
 
 
 def _resolve_option_file(text: str | None, option: str) -> Path | None:
@@ -134,7 +129,7 @@ def score(
     with show_progress("Scoring") as progress:
         result = score_camera_files(lines, cameras, size=size, without=without, progress=progress)
     print_values(result, json_)
-    _print_problems(result["problems"])
+    print_problems(result["problems"])
 
 
 @commands.command()
@@ -209,7 +204,7 @@ def link(
                 f"from {piece['first_s']:.2f} to {piece['last_s']:.2f} s: offset "
                 f"{piece['offset_s']:.3f} s, speed {piece['speed']:.4f}"
             )
-        _print_problems(result["problems"])
+        print_problems(result["problems"])
 
 
 @commands.command()
@@ -244,4 +239,4 @@ def cameras(
         print_json(result)
         return
     print_values({name: value for name, value in result.items() if name != "problems"}, False)
-    _print_problems(result["problems"])
+    print_problems(result["problems"])

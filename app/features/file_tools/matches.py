@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from app.durable import replace_file
 from app.errors import DatasetFormatError, GeometryError, InputError
+from app.features.file_tools.out_files import write_out_file
 from app.features.file_tools.track import pitch_to_row
 from app.formats.cameras import camera_file_name, format_camera_file
 from app.formats.csv_text import read_rows
@@ -51,14 +51,20 @@ class OtherFramesCameraPlaces:
     others: FrameCameraPlaces
 
 
-def read_match_of_each_frame(path: Path) -> dict[str, str]:
+def read_match_of_each_frame(path: Path, report: ReaderReport | None = None) -> dict[str, str]:
     """The match of each frame: a JSON object, or a CSV file with columns ``frame`` and ``match``.
 
-    A frame is the stem of its line file, ``00002`` or ``folder/00002``.
+    A frame is the stem of its line file, ``00002`` or ``folder/00002``. One whose match is empty
+    has none.
+
+    Args:
+        path: The file.
+        report: Gets the rows of a CSV file that name no match.
 
     Raises:
         DatasetFormatError: The file is neither.
     """
+    report = ReaderReport() if report is None else report
     content = path.read_bytes()
     if path.suffix.lower() == ".json":
         value = read_json(content, str(path))
@@ -69,9 +75,23 @@ def read_match_of_each_frame(path: Path) -> dict[str, str]:
                 None,
                 "is not a JSON object that maps each frame name to a match name",
             )
-        return dict(value)
+        return {frame: match for frame, match in value.items() if match}
     rows = read_rows(content, str(path), ("frame", "match"), ImportLimits())
-    return {row["frame"].strip(): row["match"].strip() for _, row in rows if "match" in row}
+    named = {}
+    for line, row in rows:
+        cells = {name: row.get(name, "").strip() for name in ("frame", "match")}
+        empty = next((name for name, cell in cells.items() if not cell), None)
+        if empty is None:
+            named[cells["frame"]] = cells["match"]
+        else:
+            report.add_problem_at(str(path), f"line {line}", empty, "is empty; the row is left out")
+    return named
+
+
+def require_named_frame(named: Mapping[str, str], frames: Sequence[str], path: Path) -> None:
+    """Raise InputError where a file of matches names none of some frames."""
+    if not any(frame in named for frame in frames):
+        raise InputError(f"{path} names none of the {len(frames)} frames, such as {frames[0]}")
 
 
 def collect_camera_places_of_other_frames(
@@ -237,7 +257,11 @@ class SnappedFrame:
 
 
 def refine_shared_tripod_cameras(
-    drawn: Sequence[SnappedFrame], tripod: str | None, rows: Sequence[dict[str, Any]], out: Path
+    drawn: Sequence[SnappedFrame],
+    tripod: str | None,
+    rows: Sequence[dict[str, Any]],
+    out: Path,
+    report: ReaderReport | None = None,
 ) -> None:
     """Write cameras of frames of one tripod again, with what they know together.
 
@@ -246,6 +270,7 @@ def refine_shared_tripod_cameras(
         tripod: ``one``, or a file that names the camera of each frame; None: nothing is known.
         rows: Of all frames; those of a tripod get ``shown``, the pitch that they show.
         out: Folder of the camera files.
+        report: Gets the rows of the file that name no camera.
 
     Raises:
         InputError: The file cannot be read, or names no frame, or ``out`` cannot be written.
@@ -253,7 +278,7 @@ def refine_shared_tripod_cameras(
     if tripod is None:
         return
     by_camera: dict[str, list[SnappedFrame]] = {}
-    named = None if tripod == ONE else _read_camera_names(Path(tripod), rows)
+    named = None if tripod == ONE else _read_camera_names(Path(tripod), rows, report)
     for each in drawn:
         name = ONE if named is None else named.get(each.frame, "")
         if name:
@@ -271,24 +296,18 @@ def refine_shared_tripod_cameras(
         for each, covariance in zip(frames, covariances, strict=True):
             by_frame[each.frame]["shown"] = pitch_to_row(shown, on_shown=False)
             text = format_camera_file(each.camera, flatten_covariance(covariance), each.size)
-            _write_camera_file(resolve_inside(out, camera_file_name(each.frame)), text)
+            write_out_file(resolve_inside(out, camera_file_name(each.frame)), text)
 
 
-def _read_camera_names(file: Path, rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+def _read_camera_names(
+    file: Path, rows: Sequence[Mapping[str, Any]], report: ReaderReport | None
+) -> dict[str, str]:
     """The camera of each frame, as ``calibrate --matches`` reads matches."""
     if not file.is_file():
         raise InputError(
             f'"{file}" is not {ONE}, and there is no such file',
             hint="Give a CSV file with the columns frame and match, or a JSON object of frame names and matches.",
         )
-    named = read_match_of_each_frame(file)
-    if not any(row["frame"] in named for row in rows):
-        raise InputError(f"{file} names none of the {len(rows)} frames, such as {rows[0]['frame']}")
+    named = read_match_of_each_frame(file, report)
+    require_named_frame(named, [row["frame"] for row in rows], file)
     return named
-
-
-def _write_camera_file(file: Path, text: str) -> None:
-    try:
-        replace_file(file, text.encode(), durable=False, private=False)
-    except OSError as error:
-        raise InputError(f"{file.parent} cannot be written ({error.strerror})") from error

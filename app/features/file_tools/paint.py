@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from app.config import Settings
-from app.durable import replace_file
 from app.errors import GeometryError, InputError, ReviewError
 from app.features.file_tools.matches import SnappedFrame, refine_shared_tripod_cameras
+from app.features.file_tools.out_files import require_writable_folder, write_out_file
 from app.formats.cameras import camera_file_name, format_camera_file, read_cameras
 from app.formats.file_tree import ImportLimits
 from app.formats.frame_names import IMAGE_SUFFIXES
@@ -46,6 +46,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CLICKED
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate
+from app.wording import plural
 from app.worker_process import WorkerEnded, WorkerProcess
 
 
@@ -125,6 +126,8 @@ def list_picture_stems(sources: Sequence[Path], settings: Settings) -> list[str]
 
 PROPOSED, UNSURE, NOTHING = PROPOSAL_OUTCOMES
 """Outcomes: the camera is the paint's; the clicks' camera stays; there is none."""
+NAMED = 10
+"""Files without a picture that a problem names."""
 SENTENCES = {
     "no_paint": "too little paint is seen: the camera from the annotated lines is kept",
     "paint_disagrees": "the paint and the annotated lines disagree: the camera from the lines is kept",
@@ -138,6 +141,7 @@ def snap_cameras_to_paint(
     *,
     settings: Settings,
     tripod: str | None = None,
+    report: ReaderReport | None = None,
     progress: ReportProgress | None = None,
 ) -> list[dict[str, Any]]:
     """Cameras from clicks and paint: ``camera_<stem>.json``, ``lines/<stem>.json``, ``snap.json``.
@@ -149,6 +153,7 @@ def snap_cameras_to_paint(
         settings: Limits of pictures.
         tripod: ``one`` where all pictures are of one camera that stands still, or a file that
             names the camera of each frame.
+        report: Gets what could not be read, and line files that have no picture.
         progress: Called with frames done.
 
     Returns:
@@ -157,7 +162,8 @@ def snap_cameras_to_paint(
     Raises:
         InputError: No picture has a line file, or ``out`` cannot be written.
     """
-    report = ReaderReport()
+    require_writable_folder(out)
+    report = ReaderReport() if report is None else report
     values = _read_line_values(lines, settings, report)
     match = _PictureFileMatcher(values, images, settings)
     rows: list[dict[str, Any]] = []
@@ -173,8 +179,9 @@ def snap_cameras_to_paint(
             progress(len(rows))
     if not rows:
         raise report.make_refusal_error(f"no picture has a line file of its name in {lines}")
-    refine_shared_tripod_cameras(drawn, tripod, rows, out)
-    _write_rows(out / "snap.json", rows)
+    match.add_unused_files(report, lines, "line file")
+    refine_shared_tripod_cameras(drawn, tripod, rows, out, report)
+    write_out_file(out / "snap.json", json_text(rows, indent=1) + "\n")
     return rows
 
 
@@ -183,6 +190,7 @@ def measure_paint_agreement_of_files(
     images: Sequence[Path],
     *,
     settings: Settings,
+    report: ReaderReport | None = None,
     progress: ReportProgress | None = None,
 ) -> list[dict[str, Any]]:
     """How well cameras and the paint of their pictures agree, a row for each picture.
@@ -191,12 +199,13 @@ def measure_paint_agreement_of_files(
         cameras: Folder or zip of ``camera_<stem>.json``, or one such file.
         images: Folders, zips or files; those without a camera are passed over.
         settings: Limits of pictures.
+        report: Gets what could not be read, and cameras that have no picture.
         progress: Called with frames done.
 
     Raises:
         InputError: No picture has a camera.
     """
-    report = ReaderReport()
+    report = ReaderReport() if report is None else report
     found = read_cameras(cameras, report)
     match = _PictureFileMatcher(found, images, settings)
     rows: list[dict[str, Any]] = []
@@ -206,6 +215,7 @@ def measure_paint_agreement_of_files(
             progress(len(rows))
     if not rows:
         raise report.make_refusal_error(f"no picture has a camera of its name in {cameras}")
+    match.add_unused_files(report, cameras, "camera")
     return rows
 
 
@@ -223,6 +233,7 @@ class _PictureFileMatcher:
             self._bare.setdefault(PurePosixPath(key).name, []).append(key)
         places = list_picture_stems(images, settings)
         self._stems = Counter(PurePosixPath(stem).name for stem in places)
+        self._used: set[str] = set()
 
     def iterate_matched_pictures(
         self, report: ReaderReport
@@ -232,7 +243,18 @@ class _PictureFileMatcher:
         for picture in read_pictures(self._images, self._settings, report):
             key = self._find_key(picture.stem)
             if key is not None:
+                self._used.add(key)
                 yield picture, names.name(picture.stem), key
+
+    def add_unused_files(self, report: ReaderReport, source: Path, what: str) -> None:
+        """Report the files that no picture has used; ``what`` is the word for one of them."""
+        unused = sorted(self._keys - self._used)
+        if unused:
+            count, named = plural(len(unused), what), ", ".join(unused[:NAMED])
+            more = f" and {len(unused) - NAMED} more" if len(unused) > NAMED else ""
+            report.add_problem_at(
+                str(source), None, None, f"{count} without a picture: {named}{more}"
+            )
 
     def _find_key(self, stem: str) -> str | None:
         if stem in self._keys:
@@ -374,12 +396,3 @@ def _write_snapped_camera(
             write_line_files(out / "lines", [file])
     except OSError as error:
         raise InputError(f"{out} cannot hold the cameras ({error.strerror})") from error
-
-
-def _write_rows(path: Path, rows: list[dict[str, Any]]) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        text = json_text(rows, indent=1) + "\n"
-        replace_file(path, text.encode(), durable=False, private=False)
-    except OSError as error:
-        raise InputError(f"{path.parent} cannot be written ({error.strerror})") from error

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from app.config import Settings
-from app.durable import replace_file
 from app.errors import GeometryError, InputError
 from app.features.file_tools.matches import SnappedFrame, refine_shared_tripod_cameras
+from app.features.file_tools.out_files import require_writable_folder, write_out_file
 from app.features.file_tools.paint import PictureFile, UniqueNameGenerator, read_pictures
 from app.formats.cameras import camera_file_name, format_camera_file, read_cameras
 from app.formats.report import ReaderReport
@@ -47,6 +47,7 @@ def propose_cameras_of_files(
     size: ImageSize | None = None,
     known: Sequence[Path] = (),
     tripod: str | None = None,
+    report: ReaderReport | None = None,
     progress: ReportProgress | None = None,
 ) -> list[dict[str, Any]]:
     """Write a camera file for each picture whose camera is certain, and what became of each.
@@ -60,6 +61,7 @@ def propose_cameras_of_files(
         known: Camera files of other frames of the match.
         tripod: ``one`` where all pictures are of one camera that stands still, or a file that
             names the camera of each frame.
+        report: Gets what could not be read.
         progress: Called with frames done.
 
     Returns:
@@ -68,8 +70,10 @@ def propose_cameras_of_files(
     Raises:
         InputError: There is no picture, no known camera, or ``out`` cannot hold the result.
     """
-    report = ReaderReport()
-    cameras = _read_known_cameras(known)
+    require_writable_folder(out)
+    report = ReaderReport() if report is None else report
+    of_known = ReaderReport()
+    cameras = _read_known_cameras(known, of_known)
     rows: list[dict[str, Any]] = []
     names = UniqueNameGenerator()
     seen: list[_ProposedCamera | None] = []
@@ -83,6 +87,7 @@ def propose_cameras_of_files(
     if not rows:
         why = f": {report.problems[0].message}" if report.problems else ""
         raise InputError(f"no picture (jpg, png or webp) can be read{why}")
+    report.add_problems_of(of_known)
     pitches = _estimate_pitch_of_each_frame(seen)
     if pitches:
         for at, picture in enumerate(read_pictures(sources, settings, ReaderReport())):
@@ -90,8 +95,8 @@ def propose_cameras_of_files(
                 again = _propose_on_other_pitch(picture, rows, at, out, pitches[at], seen[at], size)
                 seen[at] = again or seen[at]
     drawn = [one.drawn for one in seen if one is not None and one.drawn is not None]
-    refine_shared_tripod_cameras(drawn, tripod, rows, out)
-    _write_camera_file(out / RESULT, json_text(rows, indent=1) + "\n")
+    refine_shared_tripod_cameras(drawn, tripod, rows, out, report)
+    write_out_file(out / RESULT, json_text(rows, indent=1) + "\n")
     return rows
 
 
@@ -181,7 +186,7 @@ def _propose_and_write_camera(
         spread = None if found.snapped is None else found.snapped.covariance
         covariance = None if spread is None else flatten_covariance(spread)
         shape = size or ImageSize(width, height)
-        _write_camera_file(file, format_camera_file(camera, covariance, shape))
+        write_out_file(file, format_camera_file(camera, covariance, shape))
         known_to = collect_pitch_size_evidence(picture.image, found.camera, pitch)
         drawn = (
             SnappedFrame(frame, found.snapped, camera, shape, pitch)
@@ -217,18 +222,9 @@ def _build_result_row(frame: str, found: FrameProposal, milliseconds: float) -> 
     }
 
 
-def _read_known_cameras(paths: Sequence[Path]) -> list[Camera]:
-    report = ReaderReport()
+def _read_known_cameras(paths: Sequence[Path], report: ReaderReport) -> list[Camera]:
     cameras = [camera for path in paths for camera in read_cameras(path, report).values()]
     if paths and not cameras:
         why = f": {report.problems[0].message}" if report.problems else ""
         raise InputError(f"no camera can be read from the files of known cameras{why}")
     return cameras
-
-
-def _write_camera_file(file: Path, text: str) -> None:
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        replace_file(file, text.encode(), durable=False, private=False)
-    except OSError as error:
-        raise InputError(f"{file.parent} cannot be written ({error.strerror})") from error

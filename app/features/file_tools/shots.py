@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from app.config import Settings
-from app.durable import replace_file
 from app.errors import DatasetFormatError, ImageError, InputError, TooLargeError
 from app.features.file_tools.camera_export import key_by_frame_number
+from app.features.file_tools.out_files import require_writable_folder, write_out_file
 from app.formats.cameras import read_cameras
 from app.formats.csv_text import is_missing, read_rows
 from app.formats.file_tree import DEFAULT_LIMITS
@@ -62,6 +62,7 @@ def find_shots_in_file(
         TooLargeError: It is larger than the limits, or needs more than the process may use.
         InputError: ``out`` cannot hold the result.
     """
+    require_writable_folder(out)
 
     def forward_progress(message: tuple[int, int | None, str]) -> None:
         if progress is not None:
@@ -76,12 +77,7 @@ def find_shots_in_file(
             kind = ImageError if error.reason == "crash" else TooLargeError
             raise kind(f"{recording.name} {error}") from error
     document = _shots_to_json(found)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        content = (json_text(document, indent=1) + "\n").encode()
-        replace_file(out / RESULT, content, durable=False, private=False)
-    except OSError as error:
-        raise InputError(f"{out} cannot be written ({error.strerror})") from error
+    write_out_file(out / RESULT, json_text(document, indent=1) + "\n")
     return document
 
 
@@ -125,9 +121,11 @@ def link_live_and_replay(
         What ``link.json`` holds.
 
     Raises:
-        InputError: A folder holds no cameras, no ball, or none of the same frames.
+        InputError: A folder holds no cameras, no ball, or none of the same frames, or ``out`` cannot
+            be written.
         DatasetFormatError: ``ball.csv`` is another file.
     """
+    require_writable_folder(out)
     report = ReaderReport()
     made = find_time_map(_read_ball_rays(live, report), _read_ball_rays(replay, report), hints)
     result = {
@@ -140,8 +138,7 @@ def link_live_and_replay(
         ],
         "problems": [problem.message for problem in report.problems],
     }
-    out.mkdir(parents=True, exist_ok=True)
-    replace_file(out / "link.json", (json_text(result, indent=1) + "\n").encode())
+    write_out_file(out / "link.json", json_text(result, indent=1) + "\n")
     return result
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from app.durable import replace_file
 from app.errors import InputError, UnsafePathError
+from app.features.file_tools.out_files import require_writable_folder
 from app.formats.cameras import camera_file_name, format_camera_file
 from app.formats.report import ReaderReport
 from app.formats.sn_calibration import read_line_documents
@@ -70,6 +71,7 @@ def track_cameras_of_clip(
             "the cameras cannot be turned: the given lines already say which half of the pitch is left",
             hint="Name the lines for the other half, or leave out one of the two options.",
         )
+    require_writable_folder(out)
     named = _parse_line_file_options(lines)
     contents = {number: _read_file(path) for number, path in named.items()}
     shown = {number: str(path) for number, path in named.items()}

@@ -12,7 +12,7 @@ import typer
 
 from app.terminal.options import Dataset, Json, Size, Workers, get_current_actor
 from app.terminal.server import open_store, open_store_to_solve
-from app.terminal.terminal import print_json, print_rows, print_values, say
+from app.terminal.terminal import print_json, print_problems, print_rows, print_values, say
 from app.wording import plural
 
 if TYPE_CHECKING:
@@ -70,16 +70,20 @@ def pitch(
         raise typer.BadParameter("use either line files or --dataset")
     # What this user may not see is no file of theirs, but may be a dataset.
     if source is not None and os.path.exists(source):  # noqa: PTH110
-        if accept or match or set_:
+        if accept or match is not None or set_ is not None:
             raise typer.BadParameter(
                 "--accept, --match and --set need a dataset: leave them out for line files"
             )
         from app.features.file_tools.matches import estimate_pitch_of_files
 
-        print_values(estimate_pitch_of_files(Path(source), size=size), json_)
+        shown = estimate_pitch_of_files(Path(source), size=size)
+        print_values(shown, json_)
+        print_problems(shown["problems"])
         return
     if set_ is not None and match is None:
         raise typer.BadParameter("--set needs --match")
+    if set_ is not None and accept:
+        raise typer.BadParameter("use either --accept or --set")
     name = dataset or source or ""
     _print_pitches(_estimate_pitches_of_dataset(name, accept, match, set_, workers), match, json_)
 
@@ -91,9 +95,13 @@ def _estimate_pitches_of_dataset(
         change_pitches,
         estimate_pitches,
         pitch_size_by_match,
+        read_pitches,
     )
 
     with open_store_to_solve("Estimating", workers) as (store, executor, progress):
+        # A name or size that is wrong is refused before the estimates, which take long.
+        if match is not None:
+            pitch_size_by_match(read_pitches(store, dataset), match, size=size)
         found = estimate_pitches(store, dataset, executor, progress)
         wanted = pitch_size_by_match(found, match, accept=accept, size=size)
         if not wanted:
@@ -168,11 +176,13 @@ def picture(
     if (source is None) == (dataset is None):
         raise typer.BadParameter("use either line files or --dataset")
     if source is not None:
-        if accept or as_taken or match:
+        if accept or as_taken or match is not None:
             raise typer.BadParameter("--accept, --as-taken and --match need --dataset")
         from app.features.file_tools.matches import estimate_picture_geometry_of_files
 
-        print_values(estimate_picture_geometry_of_files(source, size=size), json_)
+        shown = estimate_picture_geometry_of_files(source, size=size)
+        print_values(shown, json_)
+        print_problems(shown["problems"])
         return
     if accept and as_taken:
         raise typer.BadParameter("use either --accept or --as-taken")
@@ -197,7 +207,8 @@ def _estimate_picture_geometry_of_dataset(
     )
 
     with open_store_to_solve("Estimating", workers) as (store, executor, progress):
-        found = estimate_picture_geometries(store, dataset, executor, progress)
+        only = None if match is None else [match]
+        found = estimate_picture_geometries(store, dataset, executor, progress, only)
         chosen = filter_by_existing_match(found, match, dataset)
         wanted = picture_geometry_by_match(chosen, accept=accept, as_taken=as_taken)
         changed = 0
@@ -286,7 +297,7 @@ def positions(
             if undo:
                 with store.write() as session:
                     undo_position_sharing(session, dataset, match, actor=get_current_actor())
-            found = get_main_camera_positions(store, dataset)
+            found = get_main_camera_positions(store, dataset, None if match is None else [match])
     print_match_states(filter_by_match(found.items, match), json_)
 
 
@@ -393,6 +404,8 @@ def rig(
 
     if undo and accept is not None:
         raise typer.BadParameter("use either --accept or --undo")
+    if undo and lines is not None:
+        raise typer.BadParameter("--undo restores an accepted rig: leave out --lines")
     with open_store() as store:
         if undo:
             print_values(

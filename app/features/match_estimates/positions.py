@@ -107,13 +107,22 @@ class _PositionTask:
     policy: CalibrationPolicy
 
 
-def get_main_camera_positions(store: Store, dataset: str | int) -> DatasetPositions:
+def get_main_camera_positions(
+    store: Store, dataset: str | int, matches: Collection[str] | None = None
+) -> DatasetPositions:
     """The main camera positions that the matches of a dataset share.
 
+    Args:
+        store: The database.
+        dataset: Name or id.
+        matches: By name: matches that the dataset must have; None: any.
+
     Raises:
-        NotFoundError: There is no such dataset.
+        NotFoundError: There is no such dataset or match.
     """
     with store.read() as session:
+        if matches is not None:
+            _list_matches_to_share(session, read_dataset_head(session, dataset), matches)
         return _read_positions(session, dataset)
 
 

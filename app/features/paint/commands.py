@@ -10,10 +10,11 @@ from typing import Annotated, Any, Literal, get_args
 import typer
 
 from app.features.match_estimates.commands import print_match_states
+from app.formats.report import ReaderReport
 from app.soccer.choices import ProposalOutcome
 from app.terminal.options import Json, Workers, get_current_actor, parse_size, read_settings
 from app.terminal.server import open_store
-from app.terminal.terminal import print_json, print_values, say, show_progress
+from app.terminal.terminal import print_json, print_problems, print_values, say, show_progress
 from app.wording import plural
 
 commands = typer.Typer()
@@ -53,7 +54,7 @@ def paint(
     Pictures that were read for the lines that they have now are left alone. The policy must say
     calibration.source paint, as touchline does; `touchline solve` computes what follows.
     """
-    from app.features.datasets.service import filter_by_match
+    from app.features.datasets.service import filter_by_existing_match
     from app.features.paint.service import (
         read_paint_of_pictures,
         summarize_paint_readings,
@@ -62,6 +63,10 @@ def paint(
 
     if show and undo:
         raise typer.BadParameter("use either --show or --undo")
+    if undo and match is not None:
+        raise typer.BadParameter(
+            "--undo takes back the newest reading of the dataset: leave out --match"
+        )
     with open_store() as store:
         if undo:
             with store.write() as session:
@@ -78,7 +83,7 @@ def paint(
                     workers=workers,
                     progress=progress,
                 )
-    print_match_states(filter_by_match(found.items, match), json_)
+    print_match_states(filter_by_existing_match(found.items, match, found.dataset), json_)
 
 
 @commands.command()
@@ -101,11 +106,18 @@ def snap(
         raise typer.BadParameter(
             "each picture is read in its own size: leave out --size", param_hint="--size"
         )
+    report = ReaderReport()
     with show_progress("Snapping") as progress:
         rows = snap_cameras_to_paint(
-            lines, images, out, settings=read_settings(), tripod=tripod, progress=progress
+            lines,
+            images,
+            out,
+            settings=read_settings(),
+            tripod=tripod,
+            report=report,
+            progress=progress,
         )
-    _print_rows(rows, json_)
+    _print_rows(rows, report, json_)
 
 
 @commands.command()
@@ -119,15 +131,17 @@ def agree(
     """How well cameras agree with the paint of their pictures; needs no lines."""
     from app.features.file_tools.paint import measure_paint_agreement_of_files
 
+    report = ReaderReport()
     with show_progress("Reading paint") as progress:
         rows = measure_paint_agreement_of_files(
-            cameras, images, settings=read_settings(), progress=progress
+            cameras, images, settings=read_settings(), report=report, progress=progress
         )
-    _print_rows(rows, json_)
+    _print_rows(rows, report, json_)
 
 
-def _print_rows(rows: list[dict[str, Any]], as_json: bool) -> None:
-    """A line for each picture, or all as JSON."""
+def _print_rows(rows: list[dict[str, Any]], report: ReaderReport, as_json: bool) -> None:
+    """A line for each picture, or all as JSON; what was left out goes to stderr."""
+    print_problems([problem.message for problem in report.problems])
     if as_json:
         print_json(rows)
         return
@@ -248,10 +262,20 @@ def _propose_for_files(
     from app.features.file_tools.propose import count_proposal_outcomes, propose_cameras_of_files
 
     wanted = None if size == "native" else parse_size(size)
+    report = ReaderReport()
     with show_progress("Proposing") as progress:
         rows = propose_cameras_of_files(
-            images, out, read_settings(), size=wanted, known=known, tripod=tripod, progress=progress
+            images,
+            out,
+            read_settings(),
+            size=wanted,
+            known=known,
+            tripod=tripod,
+            report=report,
+            progress=progress,
         )
+    problems = [problem.message for problem in report.problems]
+    print_problems(problems)
     if json_:
         print_json(rows)
         return

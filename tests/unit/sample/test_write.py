@@ -119,7 +119,7 @@ class TestWriteSample:
             return move(path, target)
 
         monkeypatch.setattr(Path, "replace", fill)
-        with pytest.raises(OSError, match="No space left"):
+        with pytest.raises(InputError, match=r"new/out cannot be written \(No space left"):
             write_sample(tmp_path / "new" / "out", 20, 3, labels_only=True, workers=1)
         assert len(moved) == 1
 

@@ -19,6 +19,7 @@ from app.terminal.terminal import (
     print_export,
     print_import,
     print_json,
+    print_values,
     show_progress,
 )
 
@@ -90,6 +91,18 @@ class TestSpellOut:
         escape_unencodable_output()
         print_json(value)
         assert json.loads(raw.getvalue()) == value
+
+
+class TestPrintValues:
+    def test_numbers_are_printed_and_other_lists_counted(
+        self, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        print_values({"sigma": [0.25, 1.0], "problems": ["a", "b", "c"], "none": []}, False)
+        assert [line.split()[1:] for line in capsys.readouterr().out.splitlines()] == [
+            ["0.25", "1"],
+            ["3"],
+            ["0"],
+        ]
 
 
 class TestPrintExport:

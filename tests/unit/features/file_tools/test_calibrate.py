@@ -211,11 +211,26 @@ class TestMatches:
 
     def test_frames_that_nobody_names_are_alone(self, match, tmp_path):
         file = tmp_path / "matches.json"
-        file.write_text("{}")
+        file.write_text(json.dumps({"replay": "cup", "06": ""}))
         run(match, tmp_path / "alone")
-        run(match, tmp_path / "shared", matches=file)
+        summary = run(match, tmp_path / "shared", matches=file)
+        assert summary["matches"] == 1
         for stem in ("00", "06"):
             assert place(tmp_path / "shared", stem) == place(tmp_path / "alone", stem)
+
+    @pytest.mark.parametrize("text", ["{}", '{"other": "cup"}', '{"00": ""}'])
+    def test_a_file_that_names_no_frame_is_refused(self, match, tmp_path, text):
+        file = tmp_path / "matches.json"
+        file.write_text(text)
+        with pytest.raises(InputError, match=r"matches\.json names none of the 8 frames, such as "):
+            run(match, tmp_path / "out", matches=file)
+
+    def test_rows_without_a_match_are_named(self, lines, tmp_path):
+        file = tmp_path / "matches.csv"
+        stem = sorted(path.stem for path in lines.glob("*.json"))[0]
+        file.write_text(f"frame,match\n{stem},cup\nx\ny,\n")
+        problems = run(lines, tmp_path / "out", matches=file)["problems"]
+        assert [f"line {line}, match" in "; ".join(problems) for line in (3, 4)] == [True, True]
 
     def test_a_file_of_something_else_is_named(self, match, tmp_path):
         file = tmp_path / "matches.csv"

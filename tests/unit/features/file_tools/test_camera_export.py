@@ -1,6 +1,9 @@
 from __future__ import annotations
 
+import errno
 import json
+import os
+import stat
 from collections.abc import Callable
 from pathlib import Path
 
@@ -89,6 +92,38 @@ class TestNpz:
 
     def test_a_recording_has_no_frame_beyond_what_is_written(self) -> None:
         assert MOST_ROWS == MAX_FRAMES
+
+
+class TestOut:
+    @pytest.mark.parametrize("form", ["npz", "opentrackio"])
+    def test_the_umask_decides_who_may_read_it(self, tmp_path: Path, form: str) -> None:
+        out = tmp_path / "out"
+        before = os.umask(0o022)
+        try:
+            export_cameras(folder_of(tmp_path / "cameras"), out, form, SIZE)
+        finally:
+            os.umask(before)
+        files = [out] if form == "npz" else list(out.iterdir())
+        assert {stat.S_IMODE(file.stat().st_mode) for file in files} == {0o644}
+
+    @pytest.mark.parametrize("form", ["npz", "opentrackio"])
+    def test_what_is_in_the_way_is_named_before_anything_is_read(
+        self, tmp_path: Path, form: str
+    ) -> None:
+        (tmp_path / "file").write_text("")
+        for out in (tmp_path / "file" / "below", tmp_path if form == "npz" else tmp_path / "file"):
+            with pytest.raises(InputError, match=r"is a (file|folder); name a (file|folder)"):
+                export_cameras(tmp_path / "nothing", out, form, SIZE)
+
+    def test_a_refused_write_names_the_file(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def refuse(*_arguments: object, **_options: object) -> None:
+            raise PermissionError(errno.EACCES, "Permission denied", "/out/.a.npz.1234.partial")
+
+        monkeypatch.setattr("app.features.file_tools.out_files.replace_file", refuse)
+        with pytest.raises(InputError, match=r"a\.npz cannot be written \(Permission denied\)"):
+            export_cameras(folder_of(tmp_path / "cameras"), tmp_path / "a.npz", "npz")
 
 
 class TestOpenTrackIO:

@@ -143,15 +143,17 @@ class TestAgreeFiles:
 
 class TestCommands:
     def test_agree_prints_one_json_document(self, folder, touchline):
-        code, out, _ = touchline(
+        code, out, err = touchline(
             "agree", folder / "cameras", folder / "images" / "good.png", "--json"
         )
         assert code == 0
         (row,) = json.loads(out)
+        assert "5 cameras without a picture: " in err
         assert row["frame"] == "good" and row["supported"] > 0.8
 
     def test_snap_takes_several_files_and_a_folder_to_write(self, folder, tmp_path, touchline):
         images = [folder / "images" / f"{name}.png" for name in ("good", "cut")]
-        code, out, _ = touchline("snap", folder / "lines", *images, tmp_path / "out")
+        code, out, err = touchline("snap", folder / "lines", *images, tmp_path / "out")
         assert (code, "good  proposed" in out) == (0, True)
+        assert "4 line files without a picture: crowd, grey, huge, small" in err
         assert (tmp_path / "out" / "camera_good.json").is_file()

@@ -57,7 +57,7 @@ class TestShots:
         path = write_film(tmp_path / "film.mp4", rendered(3, 10))
         (tmp_path / "out").write_text("no folder")
         code, _, error = touchline("shots", path, tmp_path / "out")
-        assert code == 1 and "out cannot be written" in error
+        assert code == 1 and "out is a file; name a folder" in error
 
     def test_a_recording_that_is_not_there_is_wrong_usage(
         self, tmp_path: Path, touchline: Run

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import json
+import os
+import stat
 from collections.abc import Callable
 from pathlib import Path
 
@@ -41,7 +43,12 @@ def views(tmp_path: Path) -> tuple[Path, Path, Path]:
 
 class TestLinkFiles:
     def test_the_map_is_written(self, views: tuple[Path, Path, Path]) -> None:
-        result = link_live_and_replay(*views)
+        before = os.umask(0o022)
+        try:
+            result = link_live_and_replay(*views)
+        finally:
+            os.umask(before)
+        assert stat.S_IMODE((views[2] / "link.json").stat().st_mode) == 0o644
         assert json.loads((views[2] / "link.json").read_text()) == result
         assert result.keys() >= KEYS
         assert result["outcome"] == "linked"

@@ -63,6 +63,23 @@ class TestPicture:
         assert (code, found["frames"], found["changed"]) == (0, 4, True)
         assert found["aspect"] == pytest.approx(1.06, abs=0.015)
 
+    def test_text_has_the_numbers_and_problems_are_named(self, run: Run, tmp_path: Path) -> None:
+        lines, size = tmp_path / "lines", f"{SIZE.width}x{SIZE.height}"
+        write_line_files(lines, frames(CLICKED))
+        (lines / "broken.json").write_text("{")
+        code, out, err = run("picture", lines, "--size", size)
+        values = {line.split()[0]: line.split()[1:] for line in out.splitlines()}
+        assert (code, len(values["shift"]), len(values["sigma"])) == (0, 2, 3)
+        assert 0.0 < float(values["sigma"][0]) < 0.1
+        assert "broken.json" in err
+
+    def test_an_unknown_match_is_refused_before_the_estimates(
+        self, run: Run, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("app.features.match_estimates.pictures._make_task", pytest.fail)
+        code, _, err = run("picture", "--dataset", "demo", "--match", "final")
+        assert (code, "has no match final" in err) == (1, True)
+
     def test_of_a_dataset_is_proposed_accepted_and_taken_back(self, run: Run, home: Path) -> None:
         code, out, _ = run("picture", "--dataset", "demo")
         assert (code, "use it with --accept" in out) == (0, True)

@@ -73,6 +73,20 @@ class TestPitch:
         (found,) = json.loads(run("demo", "--match", MATCH, "--set", "100x64", "--json")[1])
         assert (found["length"], found["width"]) == (100.0, 64.0)
 
+    def test_problems_of_line_files_are_named(self, run: Run, tmp_path: Path) -> None:
+        write_line_files(lines := tmp_path / "lines", frames())
+        (lines / "broken.json").write_text("{")
+        code, out, err = run(lines, "--size", f"{SIZE.width}x{SIZE.height}")
+        assert (code, "broken.json" in err) == (0, True)
+        assert ["problems", "1"] in [line.split() for line in out.splitlines()], err
+
+    def test_an_unknown_match_is_refused_before_the_estimates(
+        self, run: Run, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("app.features.pitches.service.estimate_pitches", pytest.fail)
+        code, _, err = run("demo", "--match", "final")
+        assert (code, "has no match final" in err) == (1, True)
+
     @pytest.mark.parametrize(
         ("words", "code", "sentence"),
         [
@@ -85,6 +99,11 @@ class TestPitch:
                 "there is no earlier pitch size to restore",
             ),
             (("nothing",), 1, "nothing"),
+            (
+                ("demo", "--match", MATCH, "--set", "100x64", "--accept"),
+                2,
+                "either --accept or --set",
+            ),
             ((), 2, "use either line files or --dataset"),
             (("demo", "--dataset", "demo"), 2, "use either line files or --dataset"),
         ],

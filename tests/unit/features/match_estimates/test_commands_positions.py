@@ -47,6 +47,7 @@ class TestPositions:
         [
             (("paper", "--share"), 1, "calibration.share_position"),
             (("demo", "--share", "--match", "final"), 1, "has no match final"),
+            (("demo", "--match", "final"), 1, "has no match final"),
             (("demo", "--undo"), 2, "--undo needs --match"),
             (("demo", "--undo", "--match", MATCH), 1, "share no camera position"),
             (("demo", "--undo", "--share"), 2, "use either --share or --undo"),

@@ -14,9 +14,10 @@ import pytest
 from app.config import Settings
 from app.db.store import Store
 from app.features.imports.ingest import import_groups
+from app.paint.propose import FrameProposal
 from app.soccer.group import Group, Media, Station, View
 from app.soccer.pitch import Pitch
-from tests.cameras import SIZE, looking
+from tests.cameras import SIZE, looking, write_cameras
 from tests.unit.paint.lawns import SMALL, TRUE, drawn, lawn
 
 Run = Callable[..., tuple[int, str, str]]
@@ -87,6 +88,28 @@ class TestPropose:
         touchline("propose", tmp_path / "0.png", tmp_path / "alone", "--json")
         (alone,) = json.loads((tmp_path / "alone" / "propose.json").read_text())
         assert "pitch" not in alone
+
+    def test_what_cannot_be_read_is_named(
+        self, tmp_path: Path, touchline: Run, monkeypatch: pytest.MonkeyPatch
+    ):
+        nothing = FrameProposal("nothing", "it shows no grass")
+        monkeypatch.setattr("app.features.file_tools.propose.propose_camera", lambda *_: nothing)
+        cv2.imwrite(str(tmp_path / "good.png"), np.zeros((90, 160, 3), np.uint8))
+        (tmp_path / "broken.zip").write_text("no zip")
+        (known := tmp_path / "known").mkdir()
+        write_cameras(known, {"1": TRUE})
+        (known / "camera_2.json").write_text("{")
+        words = (tmp_path / "good.png", tmp_path / "broken.zip", tmp_path / "out", "--known", known)
+        code, told, err = touchline("propose", *words, "--json")
+        assert (code, len(json.loads(told))) == (0, 1)
+        for name in ("broken.zip", "camera_2.json"):
+            assert name in err
+
+    def test_out_is_looked_at_before_the_work(self, tmp_path: Path, touchline: Run):
+        (tmp_path / "file").write_text("")
+        cv2.imwrite(str(tmp_path / "good.png"), np.zeros((90, 160, 3), np.uint8))
+        code, _, err = touchline("propose", tmp_path / "good.png", tmp_path / "file")
+        assert (code, "file is a file; name a folder" in err) == (1, True)
 
     def test_a_folder_without_pictures_is_said(self, tmp_path: Path, touchline: Run):
         (tmp_path / "in").mkdir()

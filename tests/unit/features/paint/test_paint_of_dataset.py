@@ -54,6 +54,8 @@ class TestPaint:
         [
             (("paper",), 1, "does not use the paint"),
             (("demo", "--match", "final"), 1, "has no match final"),
+            (("demo", "--show", "--match", "final"), 1, "has no match final"),
+            (("demo", "--undo", "--match", MATCH), 2, "newest reading"),
             (("demo", "--undo"), 1, "has a measurement of its paint"),
             (("demo", "--undo", "--show"), 2, "use either --show or --undo"),
         ],
