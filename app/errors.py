@@ -207,7 +207,7 @@ class SharedStationError(ConflictError):
 
 
 class HeldGroupError(ConflictError):
-    """A group of a batch is open by somebody else.
+    """Somebody else has a group of a batch open.
 
     Args:
         message: Names them.

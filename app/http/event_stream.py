@@ -294,13 +294,13 @@ class EventPublisher:
 
     def _publish_changes(self, feeds: list[EventListener], *, first: bool) -> None:
         """Tell each listener what has happened since it was told last."""
-        places, solutions = {feed.position for feed in feeds}, {feed.solution for feed in feeds}
         self._publish_banner_change(feeds, first=first)
-        news = read_new_changes(self._store, places, solutions)
+        news = read_new_changes(self._store, {(feed.position, feed.solution) for feed in feeds})
         written = functools.cache(_change_event)
         queued: dict[EventListener, list[bytes]] = {}
         for feed in feeds:
-            found = [*news.changes.get(feed.position, []), *news.solved.get(feed.solution, [])]
+            place = feed.position, feed.solution
+            found = [*news.changes.get(feed.position, []), *news.solved.get(place, [])]
             wanted = [item for item in found if feed.listens_to_change(item)]
             # Who has heard a part of it is told of all solutions again.
             events = [

@@ -264,7 +264,7 @@ PROPERTIES: Mapping[str, str] = {
     "meaning": "What it means.",
     "median": "The median; null where there is nothing.",
     "metres": "How far the ball moved, metres.",
-    "min_jac": "Smallest share of fitting markings among the views; null without cameras.",
+    "min_jac": "Smallest share of fitting markings among the views in use; null without cameras.",
     "min_score": "Only boxes with at least this score.",
     "minimum": "Smallest value; null: none.",
     "minutes_a_group": "Median of minutes a group; null where nothing was done.",

@@ -44,11 +44,11 @@ one of three groups."""
 
 @dataclass(frozen=True)
 class SuggestedFix:
-    """What a finding or a suggestion proposes to do.
+    """An edit, or a place to look at, that a finding or a suggestion proposes.
 
     ``action`` is ``relabel``, ``move_point``, ``drop_point``, ``drop_marking``, ``swap_sides``,
     ``include_view``, ``exclude_view``, ``free_picture``, ``hide_marking``, ``move_ball`` or ``pick_ball``: edits. ``draw_marking`` and ``look_ball``
-    say where a person should look and draw: what was computed there is no evidence for itself.
+    say where a person should look and draw.
     ``read_paint`` asks for its picture to be read, which is no edit either.
     """
 

@@ -154,7 +154,7 @@ export function LoginAgain() {
 		<dialog class="dialog" ref=${dialog} aria-labelledby="login-again" onCancel=${(/** @type {Event} */ event) => event.preventDefault()}>
 			<header class="dialog__header"><h2 id="login-again">Your session has ended</h2></header>
 			<${MaintenanceBar} />
-			<p>Log in to continue here. ${waiting ? `${plural(waiting, 'unsaved change')} will then be saved.` : 'All changes are saved.'}</p>
+			<p>Log in to continue here. ${waiting ? `${plural(waiting, 'unsaved change')} will then be saved.` : 'Nothing is lost.'}</p>
 			<${LoginForm} name=${me.value?.name ?? ''} />
 		</dialog>
 	`;

@@ -224,7 +224,7 @@ class TestCommands:
         found = commands.differences(calm, home)
         assert found[:2] == ["groups differ", "a.json differ"]
         # Nor is it what was said of the group.
-        assert "1 whose digest does not match their annotations: group 1" in found[2:]
+        assert "1 with a digest that does not match the annotations: group 1" in found[2:]
 
 
 class TestCrowd:

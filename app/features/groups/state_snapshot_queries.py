@@ -6,7 +6,7 @@ the rows of the tables that the log can make anew, read whole and written whole.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -16,6 +16,7 @@ from sqlalchemy import and_, delete, insert, or_, select, text
 from app.db.dialects.dialect import DeferReferences
 from app.db.json_columns import decompress_json
 from app.db.session import Session
+from app.errors import StorageError
 from app.features.datasets.queries import list_dataset_rows, parse_stored_policy
 from app.features.datasets.tables import (
     GroupChangeModel,
@@ -95,7 +96,11 @@ def replace_all_rows(
 
     Returns:
         Sentences: rows of which tables are left out, and of which groups or views that are no more.
+
+    Raises:
+        StorageError: Groups that are no more have solutions, verdicts or comments, which nothing may delete.
     """
+    _require_groups_that_others_name(session, {row["id"] for row in groups})
     # Solutions and verdicts refer to groups, which are gone for a moment.
     session.execute(DeferReferences())
     noticed_by_imports = delete(ImportFindingModel).where(ImportFindingModel.kind.not_in(SEEN))
@@ -116,6 +121,27 @@ def replace_all_rows(
                 session.execute(insert(table), rows)
     left_out.extend(_delete_lost_findings(session))
     return left_out
+
+
+def _require_groups_that_others_name(session: Session, kept: Collection[int]) -> None:
+    """Refuse to delete groups that rows name which stay without them."""
+    gone = [number for number in session.scalars(select(GroupModel.id)) if number not in kept]
+    if not gone:
+        return
+    naming = [
+        table.name
+        for table in Base.metadata.sorted_tables
+        for key in table.foreign_keys
+        if key.column.table is GroupModel.__table__
+        and key.ondelete is None
+        and session.scalar(select(key.parent).where(key.parent.in_(gone[:_BATCH])).limit(1))
+    ]
+    if naming:
+        raise StorageError(
+            f"the log does not have the groups {', '.join(map(str, gone[:_MOST_NAMED]))}, of which there are"
+            f" rows in the tables {', '.join(naming)}; nothing was changed",
+            hint="Restore a backup: touchline restore BACKUP.",
+        )
 
 
 @contextmanager

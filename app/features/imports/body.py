@@ -157,7 +157,7 @@ class GroupLimits:
         """The group with no more points than its views may have; None where it has too many views."""
         count = len(group.views)
         if count > MAX_VIEWS:
-            problem = f"has {count:,} views; the limit is {MAX_VIEWS}: it is left out"
+            problem = f"has {count:,} views; the limit is {MAX_VIEWS}, so the group is left out"
             self.report_group_left_out(group.key, problem)
             return None
         return replace(

@@ -201,7 +201,7 @@ def _check_digests(session: Session) -> CheckResult:
             apart.append(f"group {group.id}")
     whole = f"of {count:,} groups and cameras, each matching its annotations"
     return summarize_faulty_records(
-        "digests", whole, apart, "whose digest does not match their annotations", REBUILD
+        "digests", whole, apart, "with a digest that does not match the annotations", REBUILD
     )
 
 

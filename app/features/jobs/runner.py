@@ -22,7 +22,7 @@ import structlog
 
 from app.db.session import Session, now
 from app.db.store import Store
-from app.errors import NotFoundError, StorageError
+from app.errors import DamagedError, NotFoundError, StorageError
 from app.features.jobs.job_run import JobProgress, JobRun, RunQueue, Work
 from app.features.jobs.queries import (
     CANCELLED,
@@ -231,7 +231,8 @@ class JobRunner(JobRecords):
                 log.warning(
                     "the start of a job could not be written", job=run.job.id, error=str(error)
                 )
-                self._leave_queue(run, again=not (run.counted or run.progress.is_stopping))
+                # A damaged database stays so until somebody mends it.
+                self._leave_queue(run, again=not (run.counted or isinstance(error, DamagedError)))
                 self._closing.wait(1.0)
             except Exception:
                 log.exception("the record of a job could not be written", job=run.job.id)
@@ -242,6 +243,7 @@ class JobRunner(JobRecords):
     def _leave_queue(self, run: JobRun, *, again: bool = False) -> None:
         """Let a job that ran be over; ``again``: it did not begin, and waits as before."""
         with self._changed:
+            again = again and not run.progress.is_stopping
             self._queue = self._queue.without_run(run)
             if again:
                 self._queue = self._queue.with_waiting_runs(run)

@@ -249,8 +249,8 @@ class SharedJobs(Jobs):
             for run in self._queue.waiting:
                 self._queue = self._queue.without_run(run)
             self._unwritten = {}
-        if lost is not None:
-            lost.set()
+            if lost is not None:
+                lost.set()
 
     def _take_over_open_jobs(self) -> None:
         """Settle what a process that died was at; what waits is begun as its turn comes."""

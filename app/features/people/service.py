@@ -211,7 +211,7 @@ def change_person(
             session, Role.ADMIN, but=person_id, only_issuer=only
         ):
             raise ConflictError(
-                f"{person.name} is the only admin who can log in",
+                f"there is no admin but {person.name} who can log in",
                 hint="First give the role admin to another person who can log in.",
             )
         if wanted is not person.role:

@@ -324,7 +324,7 @@ def unlink_person(store: Store, person_id: int, *, actor: str) -> None:
         left = count_people_who_can_log_in(session, Role.ADMIN, only_issuer=only)
         if person.role == Role.ADMIN and not left:
             raise ConflictError(
-                f"{person.name} is the only admin who can log in, and only by the linked account",
+                f"there is no admin but {person.name} who can log in, and only by the linked account",
                 hint=f"Give {person.name} a password first, or give the role admin to another person who can log in.",
             )
         delete_logins(session, person_id, way=LoginMethod.SIGN_ON)

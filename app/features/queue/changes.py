@@ -59,14 +59,14 @@ class NewChanges:
         entry: Id of the log's last entry; 0 for an empty log.
         solution: Id of the last solution; 0 where there is none.
         changes: By the entry after which they came.
-        solved: Groups that got a solution and are in none of the changes, by the solution after which they did;
-            datasets as a whole where they are many.
+        solved: Groups that got a solution and are in none of the changes after the entry, by entry and solution
+            after which they did; datasets as a whole where they are many.
     """
 
     entry: int
     solution: int
     changes: Mapping[int, list[LoggedChange]]
-    solved: Mapping[int, list[LoggedChange]]
+    solved: Mapping[tuple[int, int], list[LoggedChange]]
 
 
 def read_newest_entry_id(store: Store) -> int:
@@ -81,20 +81,21 @@ def find_newest_entry_and_solution_ids(store: Store) -> tuple[int, int]:
         return find_newest_entry_id(session), find_newest_solution_id(session)
 
 
-def read_new_changes(
-    store: Store, places: Collection[int], solutions: Collection[int]
-) -> NewChanges:
-    """What has changed since some entries of the log, and since some solutions."""
+def read_new_changes(store: Store, places: Collection[tuple[int, int]]) -> NewChanges:
+    """What has changed since some places: each an entry of the log and a solution."""
     with store.read() as session:
-        entry, newest = find_newest_entry_id(session), find_newest_solution_id(session)
-        changes = {place: read_changes(session, place) for place in places if place < entry}
-        changed = {item.group_id for items in changes.values() for item in items}
-        solved = {
-            solution: read_newly_solved_groups(session, solution, changed)
-            for solution in solutions
-            if solution < newest
+        newest, last = find_newest_entry_id(session), find_newest_solution_id(session)
+        changes = {
+            entry: read_changes(session, entry) for entry, _ in set(places) if entry < newest
         }
-    return NewChanges(entry, newest, changes, solved)
+        solved = {
+            (entry, solution): read_newly_solved_groups(
+                session, solution, {item.group_id for item in changes.get(entry, ())}
+            )
+            for entry, solution in set(places)
+            if solution < last
+        }
+    return NewChanges(newest, last, changes, solved)
 
 
 def read_changes(session: Session, after: int) -> list[LoggedChange]:

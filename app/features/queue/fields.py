@@ -123,7 +123,7 @@ _HIDDEN_FIELDS = (
     ),
     QueryField("id", "ids", "groups one by one: id:12,15,19"),
     QueryField("batch", "ids", "assigned work: batch:3, in its order unless another is given"),
-    _make_number_field("jac", "min_jac", "smallest JaC of the views at 0.5 %, 0 to 1", "", "jac05"),
+    _make_number_field("jac", "min_jac", "smallest JaC of the views in use at 0.5 %, 0 to 1", "", "jac05"),
     _make_number_field(
         "agreement", "agreement",
         "least agreement of the views' cameras with their paint, 0 to 1; none: no paint was read",

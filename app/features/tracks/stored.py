@@ -98,25 +98,11 @@ class Track:
 
 
 def summarize_track(track: BallTrack, like: TrackSummary) -> TrackSummary:
-    """What came of tracking the ball over a stretch.
+    """The summary of a track as a list shows it.
 
-    Attributes:
-        frames: Of the stretch.
-        states: Frames by how the ball is known: ``measured`` by two views, ``one_view``, ``predicted``,
-            ``bridged`` over a gap, ``gap``.
-        events: Events by kind.
-        measurements: Balls that views show.
-        contradicted: Those that the track does not explain.
-        median_px: Median error of balls that were left out in turn and predicted, pixels; None: none was.
-        p95_px: 95th percentile of the same.
-        worst: The frame where that error is largest.
-        reason: Why there is no track; None: there is one.
-        rate: Frames a second.
-        unused: Balls that were not used, by reason.
-        warnings: Sentences: balls that were not used, jumps where other views take over, and runs of balls
-            that fit no track.
-        noise: Times that balls of a camera are noisier than clicks because it is inexact, by camera.
-        late: Seconds to add to the times of a camera, as the ball shows them, by camera.
+    Args:
+        track: With its corrections.
+        like: Has what the track does not say: measurements, rate, balls that are none.
     """
     left, worst = track.left_out, None
     if left is not None and np.isfinite(left.by_frame).any():

@@ -536,7 +536,7 @@ class TestCopies:
         with store.read() as session:
             last = find_newest_entry_id(session)
         begin_take(store, state.id, person="ann")
-        changes = read_new_changes(store, {last}, ()).changes[last]
+        changes = read_new_changes(store, [(last, 0)]).changes[last]
         assert changes and not [one for one in changes if reader.sees(one.dataset_id)]
 
 

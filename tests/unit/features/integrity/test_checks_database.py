@@ -246,7 +246,7 @@ class TestExamine:
     ) -> None:
         change(store, forged.format(group=ids[1], stations=stations_of(ids[1])))
         found = faults(store)["digests"]
-        assert f" whose digest does not match their annotations: {named} " in found.sentence
+        assert f" with a digest that does not match the annotations: {named} " in found.sentence
         assert found.advice == REBUILD
         rebuild_tables(store)
         assert faults(store) == {}

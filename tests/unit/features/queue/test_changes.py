@@ -141,10 +141,23 @@ class TestReadSolved:
         with store.read() as session:
             newest = find_newest_solution_id(session)
         near, far = newest, newest - 3
-        solved = read_new_changes(store, (), (near, far)).solved
+            entry = find_newest_entry_id(session)
+        places = [(entry, near), (entry, far)]
+        solved = read_new_changes(store, places).solved
         assert {after: [one.group_id for one in found] for after, found in solved.items()} == {
-            far: [1, 2, 3]
+            (entry, far): [1, 2, 3]
         }
         monkeypatch.setattr(module, "FAR", 2)
-        (whole,) = read_new_changes(store, (), (near, far)).solved[far]
+        (whole,) = read_new_changes(store, places).solved[entry, far]
         assert (whole.dataset, whole.kind, whole.group_id) == ("demo", "solved", None)
+
+    def test_who_is_up_to_date_hears_of_solutions_although_another_listener_is_behind(
+        self, store: Store, fill, make_group
+    ) -> None:
+        one, two = fill(make_group(1), make_group(2))
+        with store.read() as session:
+            entry, solution = find_newest_entry_id(session), find_newest_solution_id(session)
+        solve_dataset(store, "demo")
+        solved = read_new_changes(store, [(entry, solution), (0, solution)]).solved
+        assert [item.group_id for item in solved[entry, solution]] == [one, two]
+        assert solved[0, solution] == []
