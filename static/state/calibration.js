@@ -16,9 +16,9 @@ import { sameLines } from './line_changes.js';
 import { announce } from './notice.js';
 import { refuses } from './rights.js';
 import { asProposed } from './proposal_lines.js';
-import { begin, changesOf, linesOf, proposedLines, rebase, stage, stageEdit, stepBack, stepForward } from './staging.js';
+import { begin, changesOf, linesOf, overlapOf, proposedLines, rebase, stage, stageEdit, stepBack, stepForward } from './staging.js';
 
-/** @import {LinesJson, SolutionJson} from '../api/types.js' */
+/** @import {GroupDocument, LinesJson, SolutionJson} from '../api/types.js' */
 /** @import {Item} from './outbox.js' */
 /** @import {Staging} from './staging.js' */
 
@@ -148,6 +148,14 @@ export function redo() {
 	}
 	keep(stepForward(staging.value));
 	announce(`${staging.value.steps[staging.value.at - 1].label}: redone.`);
+}
+
+/** Whether a newer state of the group changes a line that is staged here, to something else. @param {GroupDocument} newer */
+export function overlapsStaged(newer) {
+	return newer.views.some(({ station, lines: saved }) => {
+		const own = stagings.value[station.id];
+		return own !== undefined && overlapOf(own, saved).length > 0;
+	});
 }
 
 /** Forget everything staged for this view. */

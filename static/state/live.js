@@ -1,17 +1,18 @@
 // @ts-check
 /** What changes elsewhere appears here: in another window, by another person, from a script. */
 
-import { effect, signal, untracked } from '@preact/signals';
+import { computed, effect, signal, untracked } from '@preact/signals';
 
 import { listenToGroups } from '../api/events.js';
 import { ApiError } from '../api/problem.js';
 import { page } from '../lib/router.js';
+import { held, overlapsStaged, staging } from './calibration.js';
 import { forget, forgetOthers, known, load, outdate } from './documents.js';
 import { draft, groupDocument, renew } from './group.js';
 import { announce } from './notice.js';
 import { outbox } from './outbox.js';
 
-/** @typedef {{group: number, etag: string | null, actor: string | null}} Told */
+/** @typedef {{group: number, etag: string | null, actor: string | null, waits?: boolean}} Told   waits: it was read, and changes a staged line */
 
 /** The last change of the group on screen that was made elsewhere. */
 export const changedElsewhere = signal(/** @type {{group: number, actor: string | null, at: number} | null} */ (null));
@@ -32,17 +33,28 @@ function heard(told) {
 	catchUp();
 }
 
+/** Whether the person has something in hand, or something of the group is on its way. @param {number} id */
+function isBusy(id) {
+	return draft.value !== null || held.value !== null || outbox.value.some((item) => item.group === id && !item.held);
+}
+
 /** Show what was told, once the person has nothing in hand and nothing on its way. */
 async function catchUp() {
 	const told = open;
 	const at = groupDocument.value;
-	if (!told || !at || draft.value || outbox.value.some(({ group, held }) => group === at.id && !held)) return;
+	if (!told || !at || isBusy(at.id)) return;
 	open = null;
 	if (told.group !== at.id || told.etag === at.etag) return;
 	try {
-		const newer = await load(told.group);
+		const newer = (told.waits && known(told.group)) || await load(told.group);
 		// Whoever has gone on meanwhile is not told of what they left.
 		if (newer.etag === at.etag || groupDocument.value?.id !== at.id) return;
+		// The page keeps the state that the staged lines were drawn on: saving them then asks which version counts.
+		if (page.value.page === 'calibration' && overlapsStaged(newer)) {
+			open ??= { ...told, waits: true };
+			if (!told.waits) announce('Another person or window changed a line that you have staged. Saving asks which version to keep.');
+			return;
+		}
 		renew(newer);
 		changedElsewhere.value = { group: at.id, actor: told.actor, at: Date.now() };
 		announce('Another person or window changed this group; the page shows the new state.');
@@ -65,8 +77,9 @@ function missed(dataset) {
 
 /** Listen while a group is on screen. */
 export function startLive() {
-	effect(() => (page.value.page === 'review' ? untracked(() => listenToGroups(heard, missed)) : undefined));
+	const listens = computed(() => page.value.page === 'review' || page.value.page === 'calibration');
+	effect(() => (listens.value ? untracked(() => listenToGroups(heard, missed)) : undefined));
 	effect(() => {
-		if (draft.value === null && outbox.value && groupDocument.value) untracked(catchUp);
+		if (draft.value === null && held.value === null && staging.value && outbox.value && groupDocument.value) untracked(catchUp);
 	});
 }

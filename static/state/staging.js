@@ -76,6 +76,13 @@ export function rebase(staging, base) {
 	return stage(begin(base), withChanges(base, Object.entries(changesOf(staging))), 'Your staged changes, on top of theirs');
 }
 
+/** The markings that both staged edits and a newer saved state change, to something else. @param {Staging} staging @param {LinesJson} newer @returns {string[]} */
+export function overlapOf(staging, newer) {
+	const theirs = changesBetween(staging.base, newer);
+	const apart = changesBetween(newer, linesOf(staging));
+	return Object.keys(changesOf(staging)).filter((marking) => marking in theirs && marking in apart);
+}
+
 /** @param {LinesJson} lines @param {[string, PointJson[] | null][]} changes new points by marking; null: it goes @returns {LinesJson} */
 function withChanges(lines, changes) {
 	const next = { ...lines };

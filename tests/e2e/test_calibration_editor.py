@@ -12,6 +12,7 @@ from playwright.sync_api import Page, expect
 from app.soccer.pitch import MARKINGS
 from tests.e2e.screen import (
     at_rest,
+    hears,
     holding,
     jobs_end,
     on_present,
@@ -341,6 +342,59 @@ class TestPaint:
         editor.press("Control+Delete")
         editor.staged(0)
         until(editor.page, lambda: editor.drawn() == drawn)
+
+
+def other_point(editor: Editor, marking: str) -> None:
+    """Save, from elsewhere, another last point of one marking."""
+    points = [dict(point) for point in editor.lines[marking]]
+    points[-1]["x"] += 2
+    on_present(
+        editor.page,
+        editor.group,
+        lambda headers: editor.page.request.patch(
+            f"{editor.address}/api/v1/views/{editor.view['id']}/lines",
+            data={"lines": {marking: points}},
+            headers=headers,
+        ),
+    )
+
+
+class TestChangesElsewhere:
+    def test_what_does_not_overlap_is_merged_without_asking(self, editor: Editor) -> None:
+        hears(editor.page)
+        mine, theirs = sorted(editor.lines)[:2]
+        editor.choose(mine)
+        editor.press(".", "Shift+ArrowDown")
+        editor.staged(1)
+        seen = editor.page.expect_response(lambda answer: answer.url.endswith(f"/{editor.group}"))
+        with seen:
+            other_point(editor, theirs)
+        editor.previewed()
+        expected = {**editor.lines}
+        editor.press("Control+s")
+        editor.saved()
+        expect(editor.page.get_by_role("alert", name="Conflict")).to_have_count(0)
+        assert editor.lines[theirs] == expected[theirs]
+        assert editor.lines[mine] != expected[mine]
+
+    def test_a_staged_line_that_another_saved_is_a_conflict_that_shows_both(
+        self, editor: Editor, console: Any
+    ) -> None:
+        console.expect("412")
+        hears(editor.page)
+        mine = sorted(editor.lines)[0]
+        editor.choose(mine)
+        editor.press(".", "Shift+ArrowDown")
+        editor.staged(1)
+        with editor.page.expect_response(lambda answer: answer.url.endswith(f"/{editor.group}")):
+            other_point(editor, mine)
+        theirs = editor.lines[mine]
+        editor.press("Control+s")
+        bar = editor.page.get_by_role("alert", name="Conflict")
+        expect(bar).to_contain_text("both changed it")
+        bar.get_by_role("button", name="Take theirs").click()
+        expect(bar).to_have_count(0)
+        assert editor.lines[mine] == theirs
 
 
 def of_static_camera(open_page: OpenPage, film: str) -> tuple[Editor, list[int]]:

@@ -4,7 +4,7 @@ import { describe, it } from 'node:test';
 import {
 	changesBetween, relabelled, sidesSwapped, withAdded, withInserted, withoutMarking, withoutPoint, withPoint,
 } from '../../static/state/line_changes.js';
-import { begin, changesOf, linesOf, rebase, stage, stepBack, stepForward } from '../../static/state/staging.js';
+import { begin, changesOf, linesOf, overlapOf, rebase, stage, stepBack, stepForward } from '../../static/state/staging.js';
 
 const LINES = {
 	'Middle line': [{ x: 10, y: 0 }, { x: 10, y: 50 }, { x: 10, y: 100 }],
@@ -95,5 +95,18 @@ describe('staging', () => {
 
 	it('has nothing left when somebody else saved the same', () => {
 		assert.deepEqual(changesOf(rebase(stage(begin(LINES), moved, 'moved'), moved)), {});
+	});
+});
+
+describe('a newer saved state', () => {
+	const moved = (/** @type {number} */ x) => withPoint(LINES, 'Middle line', 1, { x, y: 51 });
+
+	it('overlaps where both changed a marking, to something else', () => {
+		const own = stage(begin(LINES), moved(12), 'moved');
+		assert.deepEqual(overlapOf(own, moved(13)), ['Middle line']);
+		assert.deepEqual(overlapOf(own, withoutMarking(LINES, 'Middle line')), ['Middle line']);
+		assert.deepEqual(overlapOf(own, moved(12)), []);
+		assert.deepEqual(overlapOf(own, withoutMarking(LINES, 'Side line left')), []);
+		assert.deepEqual(overlapOf(begin(LINES), moved(13)), []);
 	});
 });
