@@ -17,7 +17,7 @@ import { idempotencyKey, queryText, request } from './client.js';
  * @property {boolean} dry_run
  */
 
-/** @typedef {{groups: number, splits: {[name: string]: number}, left_out: {[why: string]: number}, unsolved: number, tracks: number, stale_tracks: string[]}} FreezePlan */
+/** @typedef {{groups: number, splits: {[name: string]: number}, left_out: {[why: string]: number}, unsolved: number, tracks: number, stale_tracks: string[], views: {[name: string]: number}, unknown_cameras: string[]}} FreezePlan */
 
 /**
  * @typedef {object} VersionJson

@@ -61,20 +61,27 @@ function blank(kind) {
 	return kind === 'camera' ? { kind, test_cameras: ['cam1', 'cam2'] } : { kind };
 }
 
-/** How many groups each split has, and their share: "train 44 (73 %)". @param {{[name: string]: number}} splits */
-export function splitTexts(splits) {
-	const all = Object.values(splits).reduce((a, b) => a + b, 0);
-	return Object.entries(splits).map(([name, n]) => `${name === 'none' ? 'no split' : name} ${count(n)} (${sharePercent(n / all)})`);
+/**
+ * How many groups each split has, and their share: "train 44 (73 %)"; of a split by camera how many views.
+ *
+ * @param {SplitRequest['kind'] | undefined} kind @param {{[name: string]: number}} groups @param {{[name: string]: number}} views
+ */
+export function splitTexts(kind, groups, views) {
+	const parts = Object.entries(kind === 'camera' ? views : groups).filter(([, n]) => n > 0);
+	const all = parts.reduce((sum, [, n]) => sum + n, 0);
+	return parts.map(([name, n]) => `${name === 'none' ? 'no split' : name} ${kind === 'camera' ? plural(n, 'view') : count(n)} (${sharePercent(n / all)})`);
 }
 
 /** @param {{plan: FreezePlan, split: SplitRequest}} props */
 function Plan({ plan, split }) {
 	const left = Object.entries(plan.left_out);
 	const stale = plan.stale_tracks.length;
+	const unknown = plan.unknown_cameras;
 	return html`
 		<div class="bulk__outcome" role="status">
-			<p><strong>${count(plan.groups)}</strong> ${plan.groups === 1 ? 'group is' : 'groups are'} included${plan.groups ? html`: ${splitTexts(plan.splits).join(', ')}` : ''}.</p>
+			<p><strong>${count(plan.groups)}</strong> ${plan.groups === 1 ? 'group is' : 'groups are'} included${plan.groups ? html`: ${splitTexts(split.kind, plan.splits, plan.views).join(', ')}` : ''}.</p>
 			${split.kind === 'match' && plan.groups ? html`<p class="note">All groups of a match are in the same split, so the share of groups can differ a little from the share of matches.</p>` : null}
+			${unknown.length ? html`<p data-grade="warn">No view of these groups is from ${unknown.length === 1 ? 'the camera' : 'the cameras'} ${unknown.join(', ')}.</p>` : null}
 			${plan.unsolved ? html`<p data-grade="warn">${count(plan.unsolved)} ${plan.unsolved === 1 ? 'is' : 'are'} not solved yet.</p>` : null}
 			${plan.tracks ? html`<p>${plural(plan.tracks, 'track')} of the ball ${plan.tracks === 1 ? 'is' : 'are'} included.</p>` : null}
 			${stale ? html`<p data-grade="warn">${plural(stale, 'accepted track')} ${stale === 1 ? 'stays' : 'stay'} out, as groups have changed since (${plan.stale_tracks.slice(0, 5).join(', ')}${stale > 5 ? ', …' : ''}). Recompute these tracks and accept them first.</p>` : null}

@@ -31,11 +31,13 @@ function splitText(split) {
 /** @param {{version: VersionJson}} props */
 function Facts({ version }) {
 	const { counts } = version;
-	const splits = splitTexts(Object.fromEntries(Object.entries(counts.splits ?? {}).map(([name, part]) => [name, /** @type {any} */ (part).groups])));
+	const parts = Object.entries(counts.splits ?? {});
+	const of = (/** @type {'groups' | 'views'} */ what) => Object.fromEntries(parts.map(([name, part]) => [name, /** @type {any} */ (part)[what]]));
+	const splits = splitTexts(version.split?.kind, of('groups'), of('views'));
 	return html`
 		<dl class="facts">
 			<dt>Hash</dt><dd class="mono">${version.hash}</dd>
-			<dt>Groups</dt><dd>${count(counts.groups)}${splits.length ? ` (${splits.join(', ')})` : ''} · ${plural(counts.views ?? 0, 'view')} · ${plural(counts.balls ?? 0, 'ball')}${counts.overrides ? ` · ${count(counts.overrides)} accepted although a gate fails` : ''}</dd>
+			<dt>Groups</dt><dd>${count(counts.groups)}${splits.length ? ` (${splits.join(', ')})` : ''} · ${plural(counts.views ?? 0, 'view')} · ${plural(counts.balls ?? 0, 'ball')}${counts.tracks ? ` · ${plural(counts.tracks, 'track')}` : ''}${counts.overrides ? ` · ${count(counts.overrides)} accepted although a gate fails` : ''}</dd>
 			<dt>Split</dt><dd>${splitText(version.split)}</dd>
 			<dt>Policy</dt><dd>${version.policy?.name ?? ''} <span class="mono">${version.policy?.hash ?? ''}</span></dd>
 			<dt>Computed by</dt><dd>solver ${version.solver_version}, Touchline ${version.software_version}</dd>

@@ -7,7 +7,7 @@ version's own row come last, in one. Killed anywhere and started again it ends i
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -112,6 +112,8 @@ class FreezePlan:
         unsolved: How many of the groups that enter have to be solved first.
         tracks: How many accepted tracks of the ball enter.
         stale_tracks: Names of the accepted ones that do not, for groups have changed since.
+        views: How many views of these groups would be in each split; ``none``: in no split.
+        unknown_cameras: Test cameras of the split that no view of these groups is from.
     """
 
     groups: int
@@ -120,6 +122,8 @@ class FreezePlan:
     unsolved: int
     tracks: int = 0
     stale_tracks: tuple[str, ...] = ()
+    views: Mapping[str, int] = field(default_factory=dict)
+    unknown_cameras: tuple[str, ...] = ()
 
 
 def plan_freeze(
@@ -132,6 +136,10 @@ def plan_freeze(
         dataset: Name or id.
         request: What would be frozen.
         strict: Refuse what ``freeze_dataset`` would refuse: no group, or groups that are not solved.
+
+    Raises:
+        InputError: The request says something impossible, or no view is from a test camera.
+        ConflictError: The name is taken.
     """
     request.check()
     with store.read() as session:
@@ -144,9 +152,15 @@ def plan_freeze(
         _require_any_member(found, candidates, request.groups)
     splitter = Splitter.of(request.split, {item.match for item in candidates})
     members = [item for item in candidates if item.why is None]
-    sides = Counter(
-        splitter.split_of_group(item.match, item.split, item.views) or NO_SPLIT for item in members
-    )
+    cameras = {view for item in members for view in item.views}
+    if members:
+        _require_view_of_test_camera(request.split, cameras)
+    sides, views = Counter[str](), Counter[str]()
+    for item in members:
+        side = splitter.split_of_group(item.match, item.split, item.views) or NO_SPLIT
+        sides[side] += 1
+        by_view = splitter.splits_by_view(item.views) or {}
+        views.update(by_view.get(view, side) for view in item.views)
     return FreezePlan(
         groups=len(members),
         splits=dict(sorted(sides.items())),
@@ -154,6 +168,8 @@ def plan_freeze(
         unsolved=sum(item.unsolved for item in candidates),
         tracks=sum(not track.stale for track in tracks),
         stale_tracks=tuple(track.key for track in tracks if track.stale),
+        views=dict(sorted(views.items())),
+        unknown_cameras=_find_unknown_cameras(request.split, cameras),
     )
 
 
@@ -227,7 +243,7 @@ class _FreezeRun:
                 rows.append({**_build_version_row(item, position, dismissed), **member})
             if self._progress is not None:
                 self._progress(start + len(batch), len(self._candidates))
-        self._require_view_of_test_camera()
+        _require_view_of_test_camera(self._request.split, self._cameras)
         return rows
 
     def freeze_tracks(self) -> None:
@@ -331,15 +347,6 @@ class _FreezeRun:
         bodies = read_calibration_bodies(self._session, gone) if gone else {}
         return {CALIBRATION + key: body for key, body in bodies.items()}
 
-    def _require_view_of_test_camera(self) -> None:
-        split = self._request.split
-        if split.kind == "camera" and not self._cameras & set(split.test_cameras):
-            names = ", ".join(split.test_cameras)
-            raise InputError(
-                f"no view of the version is from a test camera ({names})",
-                pointer="/split/test_cameras",
-            )
-
     def _make_counts(self, rows: Sequence[Mapping[str, Any]]) -> Json:
         members = [row for row in rows if row["member"]]
         groups: dict[str, int] = {}
@@ -426,6 +433,21 @@ def _count_reasons(candidates: Iterable[Candidate]) -> dict[str, int]:
         if item.why is not None:
             counts[item.why] = counts.get(item.why, 0) + 1
     return dict(sorted(counts.items()))
+
+
+def _find_unknown_cameras(split: Split, cameras: Container[str]) -> tuple[str, ...]:
+    if split.kind != "camera":
+        return ()
+    return tuple(name for name in split.test_cameras if name not in cameras)
+
+
+def _require_view_of_test_camera(split: Split, cameras: Container[str]) -> None:
+    unknown = _find_unknown_cameras(split, cameras)
+    if unknown and unknown == split.test_cameras:
+        raise InputError(
+            f"no view of the version is from a test camera ({', '.join(unknown)})",
+            pointer="/split/test_cameras",
+        )
 
 
 def _require_unused_name(session: Session, dataset: DatasetHead, name: str | None) -> None:

@@ -320,7 +320,7 @@ class TestPlanFreeze:
     @pytest.mark.parametrize(
         "split", [Split(), Split("match", seed=3, test_share=0.2), Split("camera")], ids=str
     )
-    def test_it_foretells_how_many_groups_each_split_has(
+    def test_it_foretells_how_many_groups_and_views_each_split_has(
         self, store, fill, make_group, split
     ) -> None:
         fill(*(replace(make_group(at), match=f"league/2020/{at % 3}") for at in range(7)))
@@ -332,6 +332,18 @@ class TestPlanFreeze:
         counts = {side: of["groups"] for side, of in version.counts["splits"].items()}
         assert plan.splits == {side: n for side, n in counts.items() if n}
         assert sum(plan.splits.values()) == plan.groups > 0
+        views = {side: of["views"] for side, of in version.counts["splits"].items()}
+        assert plan.views == {side: n for side, n in views.items() if n}
+
+    def test_it_names_test_cameras_without_a_view(self, store, fill, make_group) -> None:
+        fill(*map(make_group, range(3)))
+        request = FreezeRequest(
+            split=Split("camera", test_cameras=("1.png", "x")), groups="passing"
+        )
+        assert plan_freeze(store, "demo", request).unknown_cameras == ("x",)
+        request = replace(request, split=Split("camera", test_cameras=("x", "y")))
+        with pytest.raises(InputError, match=r"test camera \(x, y\)"):
+            plan_freeze(store, "demo", request)
 
     def test_a_strict_plan_refuses_what_freezing_refuses(self, store, fill, make_group) -> None:
         fill(make_group(7))

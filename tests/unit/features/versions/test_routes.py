@@ -58,7 +58,7 @@ class TestFreezeVersion:
         assert answer.status_code == 200
         assert answer.json() == {
             "groups": 3, "splits": {"train": 3}, "left_out": {}, "unsolved": 0, "tracks": 0,
-            "stale_tracks": [],
+            "stale_tracks": [], "views": {"train": 6}, "unknown_cameras": [],
         }  # fmt: skip
         assert services.jobs.find() == []
 
