@@ -20,6 +20,10 @@ export const FORMATS = [
 	{ name: 'touchline', label: 'Touchline', note: 'edits and verdicts, for another installation' },
 	{ name: 'cameras', label: 'Cameras', note: 'a camera JSON for each view' },
 	{ name: 'sn-calibration', label: 'sn-calibration', note: 'lines and a camera for each view, as its evaluator reads them' },
+	{ name: 'tracks', label: 'Tracks', note: 'the ball over time: ball.csv, ball.parquet, events.csv' },
+	{ name: 'tracab', label: 'TRACAB', note: 'the ball over time as a .dat file and its XML' },
+	{ name: 'cdf', label: 'CDF', note: 'the ball over time in the Common Data Format' },
+	{ name: 'npz', label: 'NumPy', note: 'the ball over time with its cameras, as arrays' },
 ];
 
 /**

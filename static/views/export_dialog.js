@@ -19,20 +19,20 @@ import { JobProgress } from './job_progress.js';
 /** @typedef {{items: {format: string, reason: string | null, options: string[]}[]}} Formats */
 
 /**
- * The formats: one that has no place for the groups says why and cannot be chosen.
+ * The formats: one that has no place for the groups says why and cannot be chosen; while the server checks, none can.
  *
- * @param {{answers: Formats | undefined, chosen: string, choose: (name: string) => void}} props
+ * @param {{answers: Formats | undefined, checking: boolean, chosen: string, choose: (name: string) => void}} props
  */
-function FormatChoice({ answers, chosen, choose }) {
+function FormatChoice({ answers, checking, chosen, choose }) {
 	const reasons = new Map(answers?.items.map(({ format, reason }) => [format, reason]));
 	return html`
-		<fieldset class="choice">
-			<legend>Format</legend>
+		<fieldset class="choice" aria-busy=${checking}>
+			<legend>Format${checking ? ' · checking…' : ''}</legend>
 			${FORMATS.map(({ name, label, note }) => {
 				const reason = reasons.get(name);
 				return html`
-					<label key=${name} data-disabled=${Boolean(reason)} title=${reason ?? undefined}>
-						<input type="radio" name="format" value=${name} checked=${chosen === name} disabled=${Boolean(reason)} onChange=${() => choose(name)} />
+					<label key=${name} data-disabled=${checking || Boolean(reason)} title=${reason ?? undefined}>
+						<input type="radio" name="format" value=${name} checked=${chosen === name} disabled=${checking || Boolean(reason)} onChange=${() => choose(name)} />
 						<span>${label}<small>${reason ? `Not possible: ${reason}` : note}</small></span>
 					</label>`;
 			})}
@@ -96,6 +96,7 @@ export function ExportDialog({ one, version = null, onClose }) {
 	const [all, setAll] = useState(false);
 	const [wanted, setWanted] = useState(FORMATS[0].name);
 	const formats = useResource((signal) => getFormats(one.id, version ? { version: version.id } : {}, signal), [one.id, version?.id]);
+	const checking = !formats.value && !formats.error;
 	const reasons = formats.value?.items ?? [];
 	/** @param {string} name */
 	const isPossible = (name) => !reasons.some(({ format, reason }) => format === name && reason);
@@ -106,7 +107,7 @@ export function ExportDialog({ one, version = null, onClose }) {
 	const noFrames = unused('images', 'This format contains no frames');
 	const noViews = unused('views', 'Only COCO and YOLO leave out unconfirmed balls');
 	const none = !version && !all && one.accepted === 0 && chosen !== 'touchline' ? 'No group is accepted yet' : '';
-	const why = state.busy ? 'Under way' : isPossible(chosen) ? none : reasons.find(({ format }) => format === chosen)?.reason ?? '';
+	const why = state.busy ? 'Under way' : checking ? 'Checking which formats are possible' : isPossible(chosen) ? none : reasons.find(({ format }) => format === chosen)?.reason ?? '';
 	/** @param {FormData} form */
 	async function send(form) {
 		if (why) return;
@@ -138,7 +139,7 @@ export function ExportDialog({ one, version = null, onClose }) {
 					<button class="button" type="button" onClick=${() => dialog.current?.close()}>Close <kbd>Esc</kbd></button>
 				</header>
 				<div class="export">
-					<${FormatChoice} answers=${formats.value} chosen=${chosen} choose=${setWanted} />
+					<${FormatChoice} answers=${formats.value} checking=${checking} chosen=${chosen} choose=${setWanted} />
 					<div class="export__column">
 						${version ? html`<p class="note">${plural(version.counts.groups, 'group')} as frozen: always the same bytes.</p>`
 							: html`<${Choice} legend="Groups" name="groups" options=${groupChoices(one)} onChoose=${(/** @type {string} */ name) => setAll(name === 'all')} />`}

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -9,12 +11,14 @@ from app.errors import InputError
 from app.features.exports.service import export_dataset
 from app.formats.cameras import read_cameras
 from app.formats.coco_reader import read_coco
+from app.formats.export_formats import FORMATS
 from app.formats.parquet import read_parquet
 from app.formats.report import ReaderReport
 from app.soccer.group import Station
 from tests.balls import box_around
 from tests.cameras import WIDE_LENSES, wide
 
+EXPORTS_JS = Path(__file__).parents[3] / "static/state/exports.js"
 POINT = (5.0, 2.0, -0.5)
 
 
@@ -31,6 +35,11 @@ def group(make_group, lens):
     camera = wide((40.0, 12.0, -12.0), (15.0, 0.0, 0.0), lens, focal=700.0)
     station = Station(view.station.key, view.size, given=camera)
     return group.with_view(replace(view, station=station, balls=(box_around(camera, POINT),)))
+
+
+def test_the_browser_offers_every_format() -> None:
+    rows = re.findall(r"\{ name: '([^']+)'", EXPORTS_JS.read_text())
+    assert sorted(rows) == sorted(FORMATS)
 
 
 class TestWideLenses:
