@@ -10,6 +10,7 @@ import { lastGroupAddress, query, queueAddress } from '../state/navigation.js';
 import { openHelp } from '../state/workspace.js';
 import { NotificationsButton } from './comments/notifications_button.js';
 import { DatasetMenu, pageAddress } from './dataset_menu.js';
+import { SaveState } from './save_state.js';
 
 /** @import {ComponentChildren} from 'preact' */
 
@@ -39,7 +40,8 @@ function Navigation({ current, name }) {
 
 /** @param {{current: string, of?: string, children?: ComponentChildren}} props `current` names the page, `of` its dataset where the address does not */
 export function Header({ current, of, children }) {
-	const group = current === 'review' || current === 'calibration' ? groupDocument.value : null;
+	const ofGroup = current === 'review' || current === 'calibration';
+	const group = ofGroup ? groupDocument.value : null;
 	const name = group?.dataset.name ?? of ?? dataset.value?.name ?? '';
 	return html`
 		<header class="header">
@@ -47,6 +49,7 @@ export function Header({ current, of, children }) {
 			<${DatasetMenu} current=${current} name=${name} />
 			<${Navigation} current=${current} name=${name} />
 			${children ?? html`<span class="header__middle"></span>`}
+			${ofGroup ? null : html`<${SaveState} elsewhere=${true} />`}
 			<${NotificationsButton} />
 			${myName.value ? html`<a class="header__person" href="/account" title="Your account, sessions and password" aria-current=${current === 'account' ? 'page' : undefined}>${myName.value}</a>` : null}
 			<button class="header__help" type="button" aria-label="Help" title="Help: keys, legend, glossary, guide, practice" onClick=${openHelp}><kbd>?</kbd></button>

@@ -2,84 +2,22 @@
 /** The header of the review screen: which group, where in the queue, saved or not. */
 
 import { html } from 'htm/preact';
-import { useEffect, useState } from 'preact/hooks';
 
-import { ago, count } from '../lib/format.js';
-import { useNow } from '../lib/hooks.js';
-import { held } from '../state/conflict.js';
-import { groupDocument, unsaved } from '../state/group.js';
+import { count } from '../lib/format.js';
+import { groupDocument } from '../state/group.js';
 import { redo, redoable, undo, undoable } from '../state/undo.js';
-import { batchId, goNext, goPrevious, neighbours, query, queueAddress, reviewAddress } from '../state/navigation.js';
+import { batchId, goNext, goPrevious, neighbours, query, queueAddress } from '../state/navigation.js';
 import { standing } from '../state/walk.js';
 import { batch, lease } from '../state/leases.js';
 import { isCopy } from '../state/independent_annotations.js';
-import { changedElsewhere } from '../state/live.js';
-import { lasting } from '../state/outbox.js';
-import { busyWith, isAway, isSending, savedAt, waiting, wake, wasRefused } from '../state/sending.js';
 import { openThreads } from '../state/threads.js';
 import { isBlind } from '../state/verdicts.js';
 import { Header } from './header.js';
 import { Presence } from './lease_bar.js';
+import { SaveState } from './save_state.js';
 import { OpenComments } from './comments/open_comments.js';
 
 /** @import {Standing} from '../state/walk.js' */
-
-/** Saving is worth a word only when it takes long enough to wonder. */
-const SPINNER_AFTER = 300;
-/** How long a change that was made elsewhere is news, ms. */
-const NEWS = 8000;
-
-/** @returns {{state: 'saved' | 'saving' | 'away' | 'failed', words: (now: number) => string}} */
-function saveState() {
-	const here = waiting.value.length;
-	if (isAway.value && here > 0) {
-		const why = busyWith.value ? 'Server busy' : 'Offline';
-		return { state: 'away', words: () => `${why} · ${here} ${here === 1 ? 'change waits' : 'changes wait'}` };
-	}
-	if (held.value.length > 0) return { state: 'failed', words: () => 'Not saved: conflict' };
-	if (here > 0 || isSending.value) return { state: 'saving', words: () => 'Saving…' };
-	if (wasRefused.value) return { state: 'failed', words: () => 'Not saved' };
-	const news = changedElsewhere.value;
-	const fresh = (/** @type {number} */ now) => news !== null && news.group === groupDocument.value?.id
-		&& news.at > (savedAt.value ?? 0) && now - news.at < NEWS;
-	const at = savedAt.value;
-	if (fresh(Date.now())) {
-		const who = news?.actor && news.actor !== 'local' ? `by ${news.actor}` : 'elsewhere';
-		return { state: 'saved', words: () => `Changed ${who} just now` };
-	}
-	return { state: 'saved', words: (now) => (at === null ? 'No changes' : `Saved ${ago(at, now)}`) };
-}
-
-/** The way back to a group whose conflict waits. */
-function ConflictLink() {
-	const other = held.value.find(({ group }) => group !== groupDocument.value?.id);
-	if (!other) return null;
-	return html`<a class="save__conflict" href=${reviewAddress(other.group)} title="The group whose changes were not saved">Go to the conflict</a>`;
-}
-
-export function SaveState() {
-	const now = useNow(1000);
-	const { state, words } = saveState();
-	const [slow, setSlow] = useState(false);
-	useEffect(() => {
-		const timer = setTimeout(() => setSlow(state === 'saving'), state === 'saving' ? SPINNER_AFTER : 0);
-		return () => clearTimeout(timer);
-	}, [state]);
-	// A write that is answered at once is not worth a flicker.
-	const quick = state === 'saving' && !slow;
-	const text = quick ? (savedAt.value === null ? 'No changes' : `Saved ${ago(savedAt.value, now)}`) : words(now);
-	const title = state !== 'away' ? '' : lasting.value
-		? `Stored in this browser, and sent when the server ${busyWith.value ? `has time. It says: ${busyWith.value}` : 'can be reached'}`
-		: 'This browser cannot store unsaved changes: do not close the page';
-	return html`
-		<${ConflictLink} />
-		<span class="save" data-state=${quick ? 'saved' : state} data-unsaved=${unsaved.value} title=${title}>
-			<span class="save__dot" aria-hidden="true"></span>${text}
-			<span class="hidden-text" role="status" aria-live="polite">${state === 'failed' || state === 'away' ? words(now) : ''}</span>
-		</span>
-		${state === 'away' ? html`<button class="button button--small" type="button" onClick=${() => wake()}>Try now</button>` : null}
-	`;
-}
 
 /** "group 3 of 6". @param {Standing} at */
 function placeText({ place, total }) {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -226,5 +227,11 @@ class TestConflict:
         expect(bar).to_contain_text("Ball of A")
         mine.press("a")
         expect(mine.page).to_have_url(mine.page.url)
+        mine.press("i")
+        expect(mine.page.locator(".object-list")).to_have_count(0)
+        mine.page.goto("/jobs")
+        expect(mine.page.locator(".save")).to_have_text(re.compile("Not saved: conflict"))
+        mine.page.get_by_role("link", name="Go to the conflict").click()
+        mine.ready()
         bar.get_by_role("button", name="Take theirs").click()
         expect(bar).to_have_count(0)

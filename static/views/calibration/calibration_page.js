@@ -25,7 +25,7 @@ import { NoticeBar } from '../bars.js';
 import { ConflictBar } from '../conflict_bar.js';
 import { Header } from '../header.js';
 import { Letter } from '../letter.js';
-import { SaveState } from '../review_header.js';
+import { SaveState } from '../save_state.js';
 import { CameraCard } from './camera_card.js';
 import { Comparison } from './comparison.js';
 import { PitchDiagram } from './diagram.js';

@@ -9,6 +9,7 @@ import { useSize } from '../../lib/hooks.js';
 import Konva from '../../lib/konva.js';
 import { ImageStage } from '../../overlays/stage.js';
 import { changed, choice, hovered, lines, mode } from '../../state/calibration.js';
+import { conflict } from '../../state/conflict.js';
 import { paint, paintShown } from '../../state/paint.js';
 import { fitPanel, panPanel, viewportOf, zoomPanel } from '../../state/viewports.js';
 import { gain, overlaysHidden, projections } from '../../state/workspace.js';
@@ -99,12 +100,12 @@ export function EditorImage({ picture, before }) {
 		};
 		drawn.draw({
 			picture, viewport, hidden: overlaysHidden.value, projections: projections.value, boxes: false,
-			gain: gain.value, rays: false,
+			gain: gain.value, rays: false, ghosts: conflict.value?.fields,
 			selected: chosen && { kind: 'point', view: view.key, marking: chosen.marking, index: chosen.index ?? -1 },
 		});
 	}, [
 		picture, viewport.scale, viewport.left, viewport.top, size.width, size.height, saved, chosen, hovered.value,
-		overlaysHidden.value, projections.value, gain.value, seen,
+		overlaysHidden.value, projections.value, gain.value, seen, conflict.value,
 	]);
 
 	const drawing = mode.value === 'draw' && chosen;
