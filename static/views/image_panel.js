@@ -5,6 +5,7 @@ import { html } from 'htm/preact';
 import { useEffect, useLayoutEffect, useMemo, useRef } from 'preact/hooks';
 
 import { ballCenter, ballOf } from '../geometry/preview.js';
+import { toScreen } from '../geometry/viewport.js';
 import { useSize } from '../lib/hooks.js';
 import { ImageStage } from '../overlays/stage.js';
 import { filterOf } from '../state/adjustments.js';
@@ -12,6 +13,7 @@ import { conflict } from '../state/conflict.js';
 import { drawAt, insertAt } from '../state/drawing.js';
 import { draft } from '../state/group.js';
 import { suggestion } from '../state/suggestions.js';
+import { placeOf } from '../state/tab_order.js';
 import { panPanel, viewportOf, zoomPanel } from '../state/viewports.js';
 import {
 	boxes, drawing, editing, focused, focusView, gain, isSmall, otherInstant, overlaysHidden, pointerPlace, projections,
@@ -160,6 +162,8 @@ export function ImagePanel({ picture, area, sizes }) {
 	}
 
 	const isFocused = focused.value === letter;
+	const place = selected.value?.view === view.key ? placeOf(selected.value, view, picture.predictions?.marks) : null;
+	const listSide = place && toScreen(viewport, place).x > size.width / 2 ? 'left' : 'right';
 	// Two frames on screen would leave it open which view the keys mean.
 	useEffect(() => {
 		const held = document.activeElement;
@@ -187,7 +191,7 @@ export function ImagePanel({ picture, area, sizes }) {
 			${instant ? html`<${InstantChip} label=${instant.label} />` : null}
 			${picture.predictions && !drawing.value ? html`<${PredictionChip} picture=${picture} />` : null}
 			${drawing.value?.view === view.key && drawing.value.what === 'ask' ? html`<${ClassChooser} picture=${picture} />` : null}
-			${isFocused && editing.value ? html`<${ObjectList} picture=${picture} />` : html`
+			${isFocused && editing.value && !conflict.value ? html`<${ObjectList} picture=${picture} side=${listSide} />` : html`
 				<button
 					class="image-panel__edit" type="button"
 					onClick=${() => { focusView(letter); editing.value = true; }}

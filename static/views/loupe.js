@@ -4,7 +4,6 @@
 import { html } from 'htm/preact';
 import { useCallback, useEffect, useState } from 'preact/hooks';
 
-import { boxCenter } from '../geometry/ball.js';
 import { ballCenter, ballOf } from '../geometry/preview.js';
 import { Canvas } from '../lib/canvas.js';
 import { colours } from '../lib/colours.js';
@@ -12,6 +11,7 @@ import { fixed } from '../lib/format.js';
 import { drawPixelGrid } from '../overlays/pixel_grid.js';
 import { drawOverlays } from '../overlays/stage.js';
 import { filterOf } from '../state/adjustments.js';
+import { placeOf } from '../state/tab_order.js';
 import { boxes, focused, gain, pointerPlace, projections, selected } from '../state/workspace.js';
 import { useFrame } from './frame.js';
 
@@ -31,9 +31,7 @@ function targetOf(pictures) {
 	const object = selected.value;
 	const chosen = pictures.find(({ view }) => view.key === object?.view);
 	if (object && chosen) {
-		const ball = ballOf(chosen.view);
-		const at = object.kind === 'point' ? chosen.view.lines[object.marking]?.[object.index]
-			: object.kind === 'ball' ? ball && ballCenter(ball) : predictedAt(chosen, object.prediction);
+		const at = placeOf(object, chosen.view, chosen.predictions?.marks);
 		if (at) return { picture: chosen, at };
 	}
 	const over = pointerPlace.value;
@@ -43,12 +41,6 @@ function targetOf(pictures) {
 	const ball = near && ballOf(near.view);
 	const at = ball && ballCenter(ball);
 	return near && at ? { picture: near, at } : null;
-}
-
-/** @param {ViewPicture} picture @param {number} prediction */
-function predictedAt({ predictions }, prediction) {
-	const box = predictions?.marks.find(({ id }) => id === prediction)?.box;
-	return box && boxCenter(box);
 }
 
 /** The half of the window that the panel is not in. @param {string} letter */

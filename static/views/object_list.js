@@ -44,8 +44,8 @@ function ObjectButton({ picture, object }) {
 	`;
 }
 
-/** @param {{picture: ViewPicture}} props */
-export function ObjectList({ picture }) {
+/** @param {{picture: ViewPicture, side: 'left' | 'right'}} props `side`: of the picture, without the selected object */
+export function ObjectList({ picture, side }) {
 	const list = useRef(/** @type {HTMLUListElement | null} */ (null));
 	const objects = objectsOf(picture.view, boxes.value ? picture.predictions?.marks : []);
 	// Before the next key: an arrow pressed right after Enter already moves the first object.
@@ -59,7 +59,7 @@ export function ObjectList({ picture }) {
 		if (at instanceof HTMLElement) at.focus();
 	}, [JSON.stringify(objects)]);
 	return html`
-		<ul class="object-list" ref=${list} aria-label=${`Objects of view ${picture.view.letter}`}>
+		<ul class="object-list" data-side=${side} ref=${list} aria-label=${`Objects of view ${picture.view.letter}`}>
 			${objects.length ? null : html`<li class="object-list__empty">Nothing is annotated here.</li>`}
 			${objects.map((object) => html`
 				<li key=${JSON.stringify(object)}><${ObjectButton} picture=${picture} object=${object} /></li>
