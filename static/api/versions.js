@@ -5,7 +5,7 @@ import { idempotencyKey, queryText, request } from './client.js';
 
 /** @import {JobJson} from './jobs.js' */
 
-/** @typedef {{kind: 'given' | 'match' | 'camera', seed?: number, test_share?: number, test_cameras?: string[]}} SplitRequest */
+/** @typedef {{kind: 'given' | 'match' | 'camera', seed?: number | null, test_share?: number | null, test_cameras?: string[]}} SplitRequest */
 
 /**
  * @typedef {object} FreezeRequest

@@ -6,6 +6,11 @@ export function withValue(tell) {
 	return ({ target }) => tell(/** @type {HTMLInputElement | HTMLSelectElement | HTMLTextAreaElement} */ (target).value);
 }
 
+/** The number in a field; null where the field is empty. @param {string} text */
+export function numberIn(text) {
+	return text.trim() === '' ? null : Number(text);
+}
+
 /** @param {(ticked: boolean) => void} tell @returns {(event: Event) => void} */
 export function withTick(tell) {
 	return ({ target }) => tell(/** @type {HTMLInputElement} */ (target).checked);

@@ -6,7 +6,7 @@ import { useState } from 'preact/hooks';
 
 import { sentenceOf } from '../api/problem.js';
 import { postVersion, previewFreeze } from '../api/versions.js';
-import { withValue } from '../lib/field.js';
+import { numberIn, withValue } from '../lib/field.js';
 import { count, plural, sharePercent, words } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
 import { follow } from '../state/jobs.js';
@@ -47,8 +47,8 @@ function SplitFields({ split, change }) {
 		</fieldset>
 		${split.kind === 'match' ? html`
 			<div class="form__columns">
-				<div class="form__row"><label for="split-seed">Seed</label><input class="field" id="split-seed" type="number" step="1" min="0" value=${split.seed} onChange=${withValue((text) => change({ ...split, seed: Math.trunc(Number(text)) }))} /></div>
-				<div class="form__row"><label for="split-share">Share of matches for testing</label><input class="field" id="split-share" type="number" step="any" min="0.01" max="0.99" value=${split.test_share} onChange=${withValue((text) => change({ ...split, test_share: Number(text) }))} /></div>
+				<div class="form__row"><label for="split-seed">Seed</label><input class="field" id="split-seed" type="number" step="1" min="0" required value=${split.seed ?? ''} onChange=${withValue((text) => change({ ...split, seed: numberIn(text) }))} /></div>
+				<div class="form__row"><label for="split-share">Share of matches for testing</label><input class="field" id="split-share" type="number" step="any" min="0.01" max="0.99" required value=${split.test_share ?? ''} onChange=${withValue((text) => change({ ...split, test_share: numberIn(text) }))} /></div>
 			</div>` : null}
 		${split.kind === 'camera' ? html`
 			<div class="form__row"><label for="split-cameras">Test cameras</label><input class="field" id="split-cameras" value=${(split.test_cameras ?? []).join(' ')} onChange=${withValue((text) => change({ ...split, test_cameras: text.split(/[\s,]+/).filter(Boolean) }))} /><small>Names of views, separated by spaces, for example cam1 cam2</small></div>` : null}
@@ -119,11 +119,12 @@ export function FreezeDialog({ one, taken, onClose, onFrozen }) {
 	const [ask, setAsk] = useState(/** @type {FreezeRequest} */ ({ name: freeName(taken), note: '', licence: '', split: { kind: 'given' }, groups: 'accepted', dry_run: false }));
 	const [state, setState] = useState(/** @type {{job: JobJson | null, error: string}} */ ({ job: null, error: '' }));
 	const name = ask.name.trim();
-	const plan = useResource((signal) => previewFreeze(one.id, { ...ask, name: name || 'v1' }, signal), [name, ask.groups, JSON.stringify(ask.split)]);
+	const empty = ask.split.kind === 'match' && (ask.split.seed === null || ask.split.test_share === null);
+	const plan = useResource((signal) => (empty ? Promise.resolve(null) : previewFreeze(one.id, { ...ask, name: name || 'v1' }, signal)), [name, ask.groups, JSON.stringify(ask.split)]);
 	const { job } = state;
 	const busy = job !== null && (job.state === 'running' || job.state === 'waiting');
 	const done = job?.state === 'done';
-	const why = busy ? 'Under way' : done ? '' : !name ? 'A version needs a name' : plan.error ? sentenceOf(plan.error) : plan.value?.groups === 0 ? 'No group would be included' : '';
+	const why = busy ? 'Under way' : done ? '' : !name ? 'A version needs a name' : empty ? 'A split by match needs a seed and a share' : plan.error ? sentenceOf(plan.error) : plan.value?.groups === 0 ? 'No group would be included' : '';
 	async function send() {
 		if (done) { onClose(); return; }
 		if (why) return;

@@ -8,7 +8,7 @@ import { agreementFile, getAgreement, getWaiting, putLimits } from '../../api/ag
 import { ApiError, sentenceOf } from '../../api/problem.js';
 import { getIndependentAnnotations } from '../../api/independent_annotations.js';
 import { getBatches } from '../../api/work.js';
-import { withValue } from '../../lib/field.js';
+import { numberIn, withValue } from '../../lib/field.js';
 import { fixed, plural, words } from '../../lib/format.js';
 import { useResource } from '../../lib/resource.js';
 import { pageDataset } from '../../lib/router.js';
@@ -105,13 +105,14 @@ const LIMITS = /** @type {{name: keyof LimitsJson, label: string, step: string}[
 
 /** @param {{limits: LimitsJson, dataset: string, saved: () => void}} props */
 function LimitsCard({ limits, dataset, saved }) {
-	const [edited, setEdited] = useState(limits);
+	const [edited, setEdited] = useState(/** @type {{[name in keyof LimitsJson]: number | null}} */ (limits));
 	const [said, setSaid] = useState('');
 	/** @param {SubmitEvent} event */
 	async function save(event) {
 		event.preventDefault();
 		try {
-			await putLimits(dataset, edited);
+			// The browser sends no form with an empty field.
+			await putLimits(dataset, /** @type {LimitsJson} */ (edited));
 			setSaid('Saved. They apply to annotations submitted from now on.');
 			saved();
 		} catch (error) {
@@ -126,8 +127,8 @@ function LimitsCard({ limits, dataset, saved }) {
 			<form class="agreement__limits" onSubmit=${save}>
 				${LIMITS.map(({ name, label, step }) => html`
 					<label key=${name}><span>${label}</span><input class="field"
-						type="number" min="0" step=${step} required value=${edited[name]}
-						onInput=${withValue((text) => setEdited({ ...edited, [name]: Number(text) }))}
+						type="number" min="0" step=${step} required value=${edited[name] ?? ''}
+						onInput=${withValue((text) => setEdited({ ...edited, [name]: numberIn(text) }))}
 					/></label>`)}
 				<button class="button" type="submit">Save limits</button>
 			</form>
@@ -228,7 +229,7 @@ function LeadCards({ dataset }) {
 	if (!found.value) return html`<${Loading} what="the agreement" />`;
 	return html`
 		<${BatchChoice} dataset=${dataset} batch=${batch} choose=${setBatch} />
-		${found.value.groups.length > 0 ? html`<${PeopleCard} found=${found.value} dataset=${dataset} batch=${batch} /><${GroupsCard} found=${found.value} />` : html`<p class="agreement__choice">No annotations are compared yet${batch === null ? '' : ' here'}. Assign groups to several annotators (<em>Assign…</em> in the queue, <em>Annotators per group</em>), or press <kbd>Shift O</kbd> in a group.</p>`}
+		${found.value.groups.length > 0 ? html`<${PeopleCard} found=${found.value} dataset=${dataset} batch=${batch} /><${GroupsCard} found=${found.value} />` : html`<p class="agreement__none">No annotations are compared yet${batch === null ? '' : ' here'}. Assign groups to several annotators (<em>Assign…</em> in the queue, <em>Annotators per group</em>), or press <kbd>Shift O</kbd> in a group.</p>`}
 		<${TakesCard} dataset=${dataset} batch=${batch} />
 		<${LimitsCard} key=${dataset} limits=${found.value.limits} dataset=${dataset} saved=${found.reload} />
 	`;

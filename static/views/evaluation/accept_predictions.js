@@ -6,7 +6,7 @@ import { useEffect, useState } from 'preact/hooks';
 
 import { acceptPredictions } from '../../api/evaluations.js';
 import { sentenceOf } from '../../api/problem.js';
-import { withTick, withValue } from '../../lib/field.js';
+import { numberIn, withTick, withValue } from '../../lib/field.js';
 import { count, plural, words } from '../../lib/format.js';
 import { matchName } from '../../lib/match_name.js';
 import { useResource } from '../../lib/resource.js';
@@ -58,13 +58,13 @@ function useSettled(value) {
 
 /** @param {{one: DatasetJson, set: PredictionSet, onClose: () => void}} props */
 export function AcceptPredictions({ one, set, onClose }) {
-	const [typed, setTyped] = useState({ q: '', min_score: 0.5, replace: false });
+	const [typed, setTyped] = useState({ q: '', min_score: /** @type {number | null} */ (0.5), replace: false });
 	const ask = useSettled(typed);
 	const [state, setState] = useState({ busy: '', error: '' });
-	const body = { dataset: one.name, predictions: set.id, ...ask };
-	const plan = useResource((signal) => acceptPredictions({ ...body, dry_run: true }, signal), [ask.q, ask.min_score, ask.replace]);
+	const body = { dataset: one.name, predictions: set.id, ...ask, min_score: ask.min_score ?? 0 };
+	const plan = useResource((signal) => (ask.min_score === null ? Promise.resolve(null) : acceptPredictions({ ...body, dry_run: true }, signal)), [ask.q, ask.min_score, ask.replace]);
 	const would = plan.value?.changed ?? 0;
-	const why = state.busy ? 'Under way' : plan.error ? sentenceOf(plan.error) : ask !== typed || plan.waiting ? 'Counting…' : would === 0 ? 'No view would get a ball' : '';
+	const why = state.busy ? 'Under way' : plan.error ? sentenceOf(plan.error) : ask !== typed || plan.waiting ? 'Counting…' : ask.min_score === null ? 'The smallest score is empty' : would === 0 ? 'No view would get a ball' : '';
 	async function send() {
 		if (why) return;
 		setState({ busy: 'Accepting…', error: '' });
@@ -84,7 +84,7 @@ export function AcceptPredictions({ one, set, onClose }) {
 		>
 			<p>The prediction with the highest score of each view becomes its annotation, as an edit that can be undone.</p>
 			<div class="form__row"><label for="accept-q">Groups (a query as in the queue)</label><input class="field mono" id="accept-q" placeholder="every group; gate:ball for those without enough balls" value=${typed.q} autocomplete="off" spellcheck=${false} onInput=${withValue((text) => setTyped({ ...typed, q: text }))} /></div>
-			<div class="form__row"><label for="accept-score">Smallest score</label><input class="field" id="accept-score" type="number" min="0" max="1" step="any" defaultValue=${String(typed.min_score)} onInput=${withValue((text) => setTyped({ ...typed, min_score: Number(text) }))} /></div>
+			<div class="form__row"><label for="accept-score">Smallest score</label><input class="field" id="accept-score" type="number" min="0" max="1" step="any" required defaultValue=${String(typed.min_score)} onInput=${withValue((text) => setTyped({ ...typed, min_score: numberIn(text) }))} /></div>
 			<label class="form__check"><input type="checkbox" checked=${typed.replace} onChange=${withTick((replace) => setTyped({ ...typed, replace }))} />Replace existing balls</label>
 			${plan.value ? html`<${Plan} plan=${plan.value} />` : null}
 			${state.error || plan.error ? html`<p class="form__error" role="alert">${state.error || sentenceOf(plan.error)}</p>` : null}
