@@ -125,8 +125,3 @@ export function ago(then, now) {
 export function scoreText({ score, scored }) {
 	return scored ? score.toFixed(2) : 'no score';
 }
-
-/** A marking, or words with markings, where there is little room: every word that tells it from others. @param {string} text */
-export function shortMarking(text) {
-	return text.replaceAll(' rect.', '');
-}

@@ -4,7 +4,6 @@
 import { ballCenter } from '../geometry/preview.js';
 import { toScreen } from '../geometry/viewport.js';
 import { colours } from '../lib/colours.js';
-import { shortMarking } from '../lib/format.js';
 import { label, strokeLine, widthOf } from './pen.js';
 
 /** @import {PairJson} from '../api/types.js' */
@@ -79,5 +78,5 @@ function point(context, { picture, viewport }, meant) {
 
 /** Words beside a place, where there is room. @param {CanvasRenderingContext2D} context @param {string} caption @param {{x: number, y: number}} at */
 function beside(context, caption, at) {
-	if (widthOf(context) >= ROOMY) label(context, shortMarking(caption), at, colours.value.selected);
+	if (widthOf(context) >= ROOMY) label(context, caption, at, colours.value.selected);
 }

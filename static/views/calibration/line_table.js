@@ -5,7 +5,7 @@ import { html } from 'htm/preact';
 
 import { diagonal } from '../../geometry/preview.js';
 import { GLYPHS } from '../../geometry/residual.js';
-import { fixed, pixelText, pixels, shortMarking } from '../../lib/format.js';
+import { fixed, pixelText, pixels } from '../../lib/format.js';
 import { changed, choice, hovered } from '../../state/calibration.js';
 import { Undrawn } from '../view_lines.js';
 import { pickMarking } from './actions.js';
@@ -55,7 +55,7 @@ function Row({ fit, widest, influence, known }) {
 			onPointerEnter=${() => { hovered.value = name; }} onPointerLeave=${() => { hovered.value = null; }}
 		>
 			<td data-grade=${fit.grade}><span aria-hidden="true">${GLYPHS[fit.grade]}</span><span class="hidden-text">${fit.grade}</span></td>
-			<th scope="row"><button class="row-button" type="button" aria-pressed=${choice.value?.marking === name} onClick=${() => pickMarking(name)}><span title=${name}>${shortMarking(name)}</span></button></th>
+			<th scope="row"><button class="row-button" type="button" aria-pressed=${choice.value?.marking === name} onClick=${() => pickMarking(name)}><span title=${name}>${name}</span></button></th>
 			<td>${fit.points.length}${fit.used ? '' : html`<abbr title="left out by the solver">*</abbr>`}</td>
 			<td><${Bar} fit=${fit} widest=${widest} /></td>
 			<td data-grade=${fit.grade} data-number="largest">${fit.points.length ? pixels(fit.largest) : ''}</td>

@@ -119,10 +119,8 @@ function chartsOf(frames) {
 			{ label: 'explained', values: frames.explained, colour: 'chart-b', dash: [6, 3] },
 		], two, [0, 1]),
 		one('px', [{ label: 'error, px', values: frames.error_px, colour: 'chart-d' }], two, [0, null]),
-		one('degrees', [
-			{ label: 'pan, degrees', values: column(frames, PAN), colour: 'chart-a' },
-			{ label: 'tilt, degrees', values: column(frames, TILT).map((value) => (value === null ? null : value - 90)), colour: 'chart-b', dash: [6, 3] },
-		], two),
+		one('pan', [{ label: 'pan, degrees', values: column(frames, PAN), colour: 'chart-a' }], two),
+		one('tilt', [{ label: 'tilt, degrees (90 is level)', values: column(frames, TILT), colour: 'chart-b' }], two),
 		one('focal px', [{ label: 'zoom, px', values: column(frames, FOCAL), colour: 'chart-c' }], whole),
 	];
 }

@@ -116,7 +116,7 @@ export function Stage({ scene, images, habits }) {
 					<svg class="scene3d__leaders" aria-hidden="true">${scene.stands.map(({ letter }) => html`<path key=${letter} data-leader=${letter} />`)}</svg>
 					${scene.stands.map(({ letter, label }) => html`
 						<button key=${letter} class="scene3d__camera letter" type="button" data-letter=${letter} data-label=${letter} data-sees=${scene.seen ? scene.seen.has(letter) : undefined} title=${`Look through ${label}`} aria-label=${`Look through camera ${letter}`} onClick=${() => lookThrough(letter)}>${letter}</button>`)}
-					${scene.ball || scene.best ? html`<span class="scene3d__height" data-label="ball">${metres((scene.best ?? scene.ball)?.height)}</span>` : null}
+					${scene.ball || scene.best ? html`<span class="scene3d__height" data-label="ball">${metres((scene.ball ?? scene.best)?.height)}</span>` : null}
 				</div>`}
 		</div>
 	`;

@@ -216,7 +216,7 @@ export class SceneStage {
 	places() {
 		const { values, through } = this;
 		if (!values) return [];
-		const ball = values.best ?? values.ball;
+		const ball = values.ball ?? values.best;
 		return [
 			...values.stands.map(({ letter, camera }) => {
 				const place = this.placeOf(letter, camera.C);

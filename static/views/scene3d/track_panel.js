@@ -13,7 +13,7 @@ import { EVENTS, MODES, runsOf, STATES } from '../../state/tracks.js';
 import { Letter } from '../letter.js';
 import { linesOf } from '../mini_pitch.js';
 import { Presets, Stage, useImages } from './panel.js';
-import { pointAt, trackScene, trailOf } from './track_values.js';
+import { pointAt, trackScene, trailOf, withTrackNames } from './track_values.js';
 import { sceneOf } from './values.js';
 
 /** @import {TrackFrames, TrackJson} from '../../api/tracks.js' */
@@ -113,7 +113,8 @@ export function TrackScene({ track, frames, at, plays, leave }) {
 	const place = at - track.first;
 	const group = useStandingGroup(frames, place, plays);
 	const base = useMemo(() => group && sceneOf(group, group.solution), [group]);
-	const scene = useMemo(() => base && trackScene({ pitch: base.pitch, stands: base.stands, diameter: base.diameter }, frames, place, track.summary.rate), [base, frames, place]);
+	const stands = useMemo(() => withTrackNames(base?.stands ?? [], frames), [base, frames]);
+	const scene = useMemo(() => base && trackScene({ pitch: base.pitch, stands, diameter: base.diameter }, frames, place, track.summary.rate), [base, stands, frames, place]);
 	const images = useImages(group?.views ?? []);
 	const habits = useMemo(() => ({ turns: onCanvas, leave, digits: false }), []);
 	// Whoever looked through a camera of another scene does not look through one of this.

@@ -41,6 +41,17 @@ export function lettersOf(stands, names) {
 }
 
 /**
+ * Cameras under the names that the track gives its views, where it calls them by their keys.
+ *
+ * @template {Pick<Stand, 'key' | 'label'>} T
+ * @param {T[]} stands @param {Pick<TrackFrames, 'views'>} frames @returns {T[]}
+ */
+export function withTrackNames(stands, { views }) {
+	const names = new Set(views.flat());
+	return stands.some(({ key }) => names.has(key)) ? stands.map((stand) => ({ ...stand, label: stand.key })) : stands;
+}
+
+/**
  * What the 3D view shows of a track at a place of its columns.
  *
  * @param {Pick<SceneValues, 'pitch' | 'stands' | 'diameter'>} base @param {TrackFrames} frames @param {number} place
