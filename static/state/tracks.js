@@ -36,6 +36,11 @@ export function runsOf(values) {
 	return runs;
 }
 
+/** The next frame after one with a ball that contradicts the track; after the last, the first. @param {{frame: number}[]} contradicted @param {number} at */
+export function contradictedAfter(contradicted, at) {
+	return (contradicted.find(({ frame }) => frame > at) ?? contradicted[0])?.frame;
+}
+
 /** The standard deviation along x, y or upwards. @param {TrackFrames} frames @param {0 | 1 | 2} axis @returns {(number | null)[]} */
 export function spread(frames, axis) {
 	const place = [0, 3, 5][axis];

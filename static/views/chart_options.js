@@ -22,7 +22,7 @@ function tickText(place) {
 }
 
 /** Height of a line of numbers, and the width of one digit with what stands between two numbers, CSS pixels. */
-const [LINE, DIGIT, BETWEEN] = [24, 7.5, 16];
+const [LINE, DIGIT, BETWEEN] = [16, 7.5, 16];
 
 /** Room that the numbers below a picture need side by side. @param {uPlot} _plot @param {number} _axis @param {number} low @param {number} high */
 function roomBeside(_plot, _axis, low, high) {

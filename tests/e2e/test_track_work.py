@@ -164,6 +164,13 @@ class TestFinding:
         flights.wait_for_url(f"**/tracks/*?frame={SLIP}")
         shows(flights, SLIP)
         expect(flights.get_by_text("px off")).to_be_visible()
+        against = flights.get_by_role("list", name="Balls that contradict the track")
+        expect(against.get_by_title(f"in frame {SLIP}")).to_be_visible()
+        flights.keyboard.press("ArrowRight")
+        shows(flights, SLIP + 1)
+        flights.get_by_role("button", name="contradicts the track").click()
+        shows(flights, SLIP)
+        flights.evaluate("document.activeElement.blur()")
         flights.keyboard.press("Enter")
         flights.wait_for_url("**/review/*")
 

@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
-import { corrected, curvesOf, eventAt, eventBy, mostShown, partOf, runsOf } from '../../static/state/tracks.js';
+import { contradictedAfter, corrected, curvesOf, eventAt, eventBy, mostShown, partOf, runsOf } from '../../static/state/tracks.js';
 
 const EVENTS = [{ frame: 10, kind: 'kick' }, { frame: 14, kind: 'bounce' }, { frame: 30, kind: 'out' }];
 const FRAMES = {
@@ -15,6 +15,14 @@ describe('runsOf', () => {
 	it('joins neighbours of one value', () => {
 		assert.deepEqual(runsOf(['a', 'a', 'b', 'a']), [{ value: 'a', from: 0, to: 1 }, { value: 'b', from: 2, to: 2 }, { value: 'a', from: 3, to: 3 }]);
 		assert.deepEqual(runsOf([]), []);
+	});
+});
+
+describe('contradictedAfter', () => {
+	it('leads from frame to frame with a ball that contradicts the track, and round', () => {
+		const found = [{ frame: 5 }, { frame: 5 }, { frame: 9 }];
+		assert.deepEqual([4, 5, 9].map((at) => contradictedAfter(found, at)), [5, 9, 5]);
+		assert.equal(contradictedAfter([], 4), undefined);
 	});
 });
 

@@ -2,7 +2,7 @@
 /** Keys of the page of a track. */
 
 import { navigate } from '../../lib/router.js';
-import { eventAt, eventBy, EVENTS } from '../../state/tracks.js';
+import { contradictedAfter, eventAt, eventBy, EVENTS } from '../../state/tracks.js';
 
 /** @import {EventKind, TrackFrames, TrackJson} from '../../api/tracks.js' */
 /** @import {Binding} from '../../lib/keys.js' */
@@ -51,7 +51,7 @@ export function keysOfTrack(doing) {
 		{ keys: ['w'], label: 'Worst frame: the largest left-out error', group: look, run: () => { const { worst } = doing.current.track.summary; if (worst !== null) goTo(worst); } },
 		{ keys: ['c'], label: 'Next frame with a ball that contradicts the track', group: look, run: () => {
 			const { frames, at } = doing.current;
-			const frame = frames?.contradicted.find((one) => one.frame > at)?.frame ?? frames?.contradicted[0]?.frame;
+			const frame = contradictedAfter(frames?.contradicted ?? [], at);
 			if (frame !== undefined) goTo(frame);
 		} },
 		{ keys: ['+', '='], label: 'Show fewer frames', group: look, shown: '+', run: () => doing.current.zoom(0.5) },

@@ -14,10 +14,10 @@ import { useResource } from '../../lib/resource.js';
 import { address, navigate, page, param, place } from '../../lib/router.js';
 import { stored } from '../../lib/storage.js';
 import { me } from '../../state/me.js';
-import { announce, complain, inform } from '../../state/notice.js';
+import { announce, complain, dismiss, inform } from '../../state/notice.js';
 import { listValues, nextOpen, trackAddress } from '../../state/track_list.js';
 import { makeTrackPlayer, PACES } from '../../state/track_player.js';
-import { amid, corrected, curvesOf, eventAt, EVENTS, jumpText, MODES, mostShown, partOf, runsOf, STATES } from '../../state/tracks.js';
+import { amid, contradictedAfter, corrected, curvesOf, eventAt, EVENTS, jumpText, MODES, mostShown, partOf, runsOf, STATES } from '../../state/tracks.js';
 import { Chart, Numbers } from '../chart.js';
 import { pageAddress } from '../dataset_menu.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
@@ -68,6 +68,7 @@ function Band({ frames, at, goTo, whole }) {
 	}
 	const inside = frames.events.filter(({ frame }) => frame >= first && frame < first + total);
 	const jumps = frames.jumps.filter(({ frame }) => frame >= first && frame < first + total);
+	const against = [...new Set(frames.contradicted.map(({ frame }) => frame))].filter((frame) => frame >= first && frame < first + total);
 	const shown = at >= first && at < first + total;
 	return html`
 		<div class="track__band" data-whole=${whole} onClick=${click}>
@@ -75,6 +76,7 @@ function Band({ frames, at, goTo, whole }) {
 				${inside.map((event) => html`<li key=${`${event.frame} ${event.kind}`} style=${{ left: left(event.frame) }} data-kind=${event.kind} data-added=${event.added} title=${`${event.kind} in frame ${event.frame}`}><span class="hidden-text">${event.kind} in frame ${event.frame}</span><span aria-hidden="true">${EVENTS.find(({ kind }) => kind === event.kind)?.letter}</span></li>`)}
 			</ol>
 			${jumps.length ? html`<ol class="track__jumps" aria-label="Jumps where the views change">${jumps.map((jump) => html`<li key=${jump.frame} style=${{ left: left(jump.frame) }} title=${jumpText(jump)}><span class="hidden-text">${jumpText(jump)}</span><span aria-hidden="true">J</span></li>`)}</ol>` : null}
+			${against.length ? html`<ol class="track__jumps" data-what="against" aria-label="Balls that contradict the track">${against.map((frame) => html`<li key=${frame} style=${{ left: left(frame) }} title=${`A ball contradicts the track in frame ${frame}`}><span class="hidden-text">frame ${frame}</span><span aria-hidden="true">!</span></li>`)}</ol>` : null}
 			<ol class="track__modes" aria-label="What the ball does">
 				${modes.map(({ value, from, to }) => html`<li key=${from} style=${{ flexGrow: to - from + 1 }} data-mode=${value || 'gap'} title=${`${MODES[value].name}: frames ${frames.frame[from]} to ${frames.frame[to]}`}><span class="hidden-text">${MODES[value].name}, frames ${frames.frame[from]} to ${frames.frame[to]}</span><span aria-hidden="true">${MODES[value].letter}</span></li>`)}
 			</ol>
@@ -128,7 +130,7 @@ function chartsOf(frames, around) {
 function Now({ around, at }) {
 	const place = at - around.frame[0];
 	const [x, y, z, left] = [around.x[place], around.y[place], around.z[place], around.left_out_px[place]];
-	const where = typeof x === 'number' && typeof y === 'number' && typeof z === 'number' ? `${fixed(x, 2)}, ${fixed(y, 2)}, ${fixed(-z, 2)} m up` : null;
+	const where = typeof x === 'number' && typeof y === 'number' && typeof z === 'number' ? `x ${fixed(x, 2)}, y ${fixed(y, 2)}, height ${fixed(-z, 2)} m` : null;
 	return html`
 		<div class="track__now" data-around=${at}>
 			<p><strong>With the present groups:</strong> ${around.reason ?? where ?? 'not known'}${typeof left === 'number' ? `, left-out error ${fixed(left, 1)} px` : ''}.</p>
@@ -151,7 +153,7 @@ function FrameCard({ track, frames, around, at, goTo }) {
 		<section class="card" aria-labelledby="frame-title" data-frame=${at}>
 			<h2 id="frame-title">Frame ${at} <small>${frames.time_s[place].toFixed(2)} s</small></h2>
 			<dl class="facts">
-				<dt>Ball</dt><dd>${x === null || y === null || z === null ? 'not known' : `${fixed(x, 2)}, ${fixed(y, 2)}, ${fixed(-z, 2)} m up`}</dd>
+				<dt>Ball</dt><dd>${x === null || y === null || z === null ? 'not known' : `x ${fixed(x, 2)}, y ${fixed(y, 2)}, height ${fixed(-z, 2)} m`}</dd>
 				<dt>Sigma</dt><dd>${sigma === null ? '–' : `${fixed(sigma, 2)} m`}</dd>
 				<dt>Speed</dt><dd>${velocity ? `${fixed(3.6 * Math.hypot(...velocity), 0)} km/h` : '–'}</dd>
 				<dt>Source</dt><dd>${STATES[frames.state[place]]}${frames.views[place].length ? ` (${frames.views[place].join(', ')})` : ''}</dd>
@@ -169,8 +171,8 @@ function FrameCard({ track, frames, around, at, goTo }) {
 	`;
 }
 
-/** @param {{track: TrackJson, judge: (verdict: 'accepted' | 'rejected' | 'none') => void}} props */
-function VerdictCard({ track, judge }) {
+/** @param {{track: TrackJson, judge: (verdict: 'accepted' | 'rejected' | 'none') => void, toContradicted: () => void}} props */
+function VerdictCard({ track, judge, toContradicted }) {
 	const { summary } = track;
 	const why = track.stale ? 'Its groups have changed: recompute the track first' : '';
 	/** @param {'accepted' | 'rejected'} verdict */
@@ -179,7 +181,7 @@ function VerdictCard({ track, judge }) {
 		<section class="card" aria-labelledby="track-title">
 			<h2 id="track-title">Track</h2>
 			<p>${verdictText(track)}${track.judged_by && track.verdict ? html` by ${track.judged_by}` : null}</p>
-			<p class="note">${summary.median_px === null ? 'No ball could be left out to measure the error' : `Error of left-out balls: median ${fixed(summary.median_px, 1)} px, 95 % within ${fixed(summary.p95_px, 1)} px`}. Made from ${plural(summary.measurements, 'ball')} of all views${summary.contradicted ? `; ${summary.contradicted} ${summary.contradicted === 1 ? 'contradicts' : 'contradict'} the track` : ''}.</p>
+			<p class="note">${summary.median_px === null ? 'No ball could be left out to measure the error' : `Error of left-out balls: median ${fixed(summary.median_px, 1)} px, 95 % within ${fixed(summary.p95_px, 1)} px`}. Made from ${plural(summary.measurements, 'ball')} of all views${summary.contradicted ? html`; <button class="link-button" type="button" title="The next frame with a ball that contradicts the track (c)" onClick=${toContradicted}>${summary.contradicted} ${summary.contradicted === 1 ? 'contradicts' : 'contradict'} the track</button>` : null}.</p>
 			${(summary.median_px ?? 0) > CLICK_PX ? html`<p class="note">Left-out balls are predicted less exactly than a click: the cameras contradict each other. An adjustment to lines and balls (<code>touchline rig</code>) may bring them together.</p>` : null}
 			<p class="buttons">
 				<button class="button" type="button" data-needs="review" data-of=${track.dataset} aria-pressed=${track.verdict === 'accepted'} aria-disabled=${why !== ''} title=${why} onClick=${() => { if (!why) press('accepted'); }}>Accept <kbd>a</kbd></button>
@@ -289,7 +291,10 @@ function Track({ track, setTrack }) {
 	/** @param {(present: TrackJson) => Parameters<typeof patchTrack>[1]} make of the last answer @param {string} told @returns {Promise<boolean>} whether it is saved */
 	async function sendNow(make, told) {
 		try {
-			keep(await patchTrack(newest.current, make(newest.current)));
+			const changed = await patchTrack(newest.current, make(newest.current));
+			keep(changed);
+			// A notice that no track waits for a verdict is no longer true.
+			if (!changed.verdict) dismiss();
 			announce(told);
 			return true;
 		} catch (problem) {
@@ -351,7 +356,7 @@ function Track({ track, setTrack }) {
 			</section>
 			<div class="track__rail">
 				<${FrameCard} track=${track} frames=${frames} around=${around} at=${at} goTo=${goTo} />
-				<${VerdictCard} track=${track} judge=${judge} />
+				<${VerdictCard} track=${track} judge=${judge} toContradicted=${() => { const frame = contradictedAfter(frames.contradicted, at); if (frame !== undefined) goTo(frame); }} />
 				<${EventCard} frames=${frames} at=${at} goTo=${goTo} correct=${correct} />
 			</div>
 		</div>
