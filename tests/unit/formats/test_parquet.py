@@ -148,6 +148,15 @@ class TestWriteParquet:
         assert (fallen["ball_3d_x"], fallen["pan_degrees"], fallen["covariance"]) == (None,) * 3
         assert fallen["view_failed"] == "jac"
 
+    def test_a_view_without_a_ball_has_no_box(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    ) -> None:
+        group = soccer_group()
+        bare = group.with_view(replace(group.views[0], balls=()))
+        counts = write_parquet(tmp_path, [solved(bare)])
+        assert [row["box_x"] is None for row in rows(tmp_path)] == [True, False]
+        assert counts["boxes"] == 1
+
     def test_an_export_without_rows_still_has_its_columns(self, tmp_path: Path) -> None:
         write_parquet(tmp_path, [])
         file = pq.ParquetFile(tmp_path / "views.parquet")
