@@ -37,7 +37,7 @@ function Now({ around, frame }) {
 	const against = around.contradicted.filter((one) => one.frame === frame);
 	return html`
 		<dl class="facts" data-around=${frame}>
-			<dt>Ball</dt><dd>${x === null || y === null || z === null ? 'not known' : `x ${fixed(x, 2)}, y ${fixed(y, 2)}, height ${fixed(-z, 2)} m`}</dd>
+			<dt>Ball</dt><dd>${x === null || y === null || z === null ? 'not known' : `x ${fixed(x, 2)}, y ${fixed(y, 2)}, height\u00a0${fixed(-z, 2)}\u00a0m`}</dd>
 			<dt>Sigma</dt><dd>${sigma === null ? '–' : `${fixed(sigma, 2)} m`}</dd>
 			<dt>Source</dt><dd>${STATES[around.state[place]]}</dd>
 			<dt>Left-out error</dt><dd>${left === null ? '–' : pixelText(left)}</dd>

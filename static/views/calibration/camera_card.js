@@ -88,9 +88,9 @@ export function CameraCard({ picture, solution }) {
 				<${SourceChoice} view=${view} />
 				<${PictureChoice} view=${view} />
 				<dl class="camera-card__numbers">
-					${cameraNumbers(calibration, view).map(({ name, label, value, digits, unit, sigma }) => html`
+					${cameraNumbers(calibration, view).map(({ name, label, value, digits, unit, sigma, title }) => html`
 						<div key=${name}>
-							<dt>${label}</dt>
+							<dt title=${title}>${label}</dt>
 							<dd data-number=${name}>${fixed(value, digits, unit)}${sigma === null ? null : html`<small>±${fixed(sigma, digits === 0 ? 0 : Math.max(digits, 2))}</small>`}</dd>
 						</div>`)}
 				</dl>

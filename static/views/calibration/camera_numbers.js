@@ -5,7 +5,7 @@ import { profileOf, unbend } from '../../geometry/fisheye.js';
 
 /** @import {CalibrationJson, CameraJson, FindingJson, SolutionJson} from '../../api/types.js' */
 
-/** @typedef {{name: string, label: string, value: number | null, digits: number, unit: string, sigma: number | null}} CameraNumber */
+/** @typedef {{name: string, label: string, value: number | null, digits: number, unit: string, sigma: number | null, title?: string}} CameraNumber */
 
 /** Kinds of findings that speak about a camera. */
 const ABOUT_CAMERAS = new Set(['implausible_camera', 'under_constrained', 'picture_geometry', 'camera_size', 'paint_disagrees', 'no_paint', 'sides_swapped', 'view_disagrees']);
@@ -24,7 +24,7 @@ export function cameraNumbers(calibration, size) {
 	const row = (name, label, value, digits, unit) => ({ name, label, value, digits, unit, sigma: sigma[name] ?? null });
 	return [
 		row('pan', 'Pan', camera?.pan_degrees ?? null, 2, '°'),
-		row('tilt', 'Tilt (90° is level)', camera?.tilt_degrees ?? null, 2, '°'),
+		{ ...row('tilt', 'Tilt', camera?.tilt_degrees ?? null, 2, '°'), title: '90° is level' },
 		row('roll', 'Roll', camera?.roll_degrees ?? null, 2, '°'),
 		row('x', 'x', x, 2, ' m'),
 		row('y', 'y', y, 2, ' m'),

@@ -130,7 +130,7 @@ function chartsOf(frames, around) {
 function Now({ around, at }) {
 	const place = at - around.frame[0];
 	const [x, y, z, left] = [around.x[place], around.y[place], around.z[place], around.left_out_px[place]];
-	const where = typeof x === 'number' && typeof y === 'number' && typeof z === 'number' ? `x ${fixed(x, 2)}, y ${fixed(y, 2)}, height ${fixed(-z, 2)} m` : null;
+	const where = typeof x === 'number' && typeof y === 'number' && typeof z === 'number' ? `x ${fixed(x, 2)}, y ${fixed(y, 2)}, height\u00a0${fixed(-z, 2)}\u00a0m` : null;
 	return html`
 		<div class="track__now" data-around=${at}>
 			<p><strong>With the present groups:</strong> ${around.reason ?? where ?? 'not known'}${typeof left === 'number' ? `, left-out error ${fixed(left, 1)} px` : ''}.</p>
@@ -153,7 +153,7 @@ function FrameCard({ track, frames, around, at, goTo }) {
 		<section class="card" aria-labelledby="frame-title" data-frame=${at}>
 			<h2 id="frame-title">Frame ${at} <small>${frames.time_s[place].toFixed(2)} s</small></h2>
 			<dl class="facts">
-				<dt>Ball</dt><dd>${x === null || y === null || z === null ? 'not known' : `x ${fixed(x, 2)}, y ${fixed(y, 2)}, height ${fixed(-z, 2)} m`}</dd>
+				<dt>Ball</dt><dd>${x === null || y === null || z === null ? 'not known' : `x ${fixed(x, 2)}, y ${fixed(y, 2)}, height\u00a0${fixed(-z, 2)}\u00a0m`}</dd>
 				<dt>Sigma</dt><dd>${sigma === null ? '–' : `${fixed(sigma, 2)} m`}</dd>
 				<dt>Speed</dt><dd>${velocity ? `${fixed(3.6 * Math.hypot(...velocity), 0)} km/h` : '–'}</dd>
 				<dt>Source</dt><dd>${STATES[frames.state[place]]}${frames.views[place].length ? ` (${frames.views[place].join(', ')})` : ''}</dd>
