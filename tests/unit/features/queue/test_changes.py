@@ -139,9 +139,8 @@ class TestReadSolved:
     ) -> None:
         fill(*(make_group(number) for number in (1, 2, 3)))
         with store.read() as session:
-            newest = find_newest_solution_id(session)
+            newest, entry = find_newest_solution_id(session), find_newest_entry_id(session)
         near, far = newest, newest - 3
-            entry = find_newest_entry_id(session)
         places = [(entry, near), (entry, far)]
         solved = read_new_changes(store, places).solved
         assert {after: [one.group_id for one in found] for after, found in solved.items()} == {
