@@ -17,12 +17,13 @@ from app.errors import GeometryError
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.paint.candidates import MAIN, WIDE
-from app.paint.frame_pitch import find_shared_pitch
+from app.paint.frame_pitch import make_paint_sightings
 from app.paint.snap import WINDOWS, snap_to_prepared_picture
+from app.soccer.frames import ImageSize
 from app.soccer.paint_evidence import NO_PAINT
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
-from app.solving.tripod_pitch import MOST_FRAMES
+from app.solving.tripod_pitch import MOST_FRAMES, do_cameras_travel, find_tripod_pitch
 from app.tracking.clip import Clip
 from app.tracking.follow import (
     BRIDGED,
@@ -316,10 +317,11 @@ def _drop_cameras_of_unconfirmed_runs(
             frame for frame in chosen if _is_at_key_frame_position(clip, frame, keys, pitch, policy)
         )
         confirmed = next(near, None)
-        if confirmed is None and _stand_on_one_tripod(frames, asked, pitch, policy):
+        if confirmed is None and chosen and _stand_on_one_tripod(frames, asked, pitch, policy):
             confirmed = chosen[0]
         if confirmed is None:
-            again = (frame for frame in chosen if _is_proposed(clip, frame, pitch, policy))
+            # Each of these searches costs as much as following a dozen frames.
+            again = (frame for frame in chosen[1::2] if _is_proposed(clip, frame, pitch, policy))
             confirmed = next(again, None)
         if confirmed is not None:
             frames[confirmed.number] = replace(confirmed, is_key=True)
@@ -372,13 +374,26 @@ def _stand_on_one_tripod(
         for frame in frames[start:end]
         if frame.outcome == TRACKED
     ]
-    both = [
-        frame.snapped
+    before, behind = (
+        [
+            frame.snapped
+            for frame in each[:: max(len(each) // (MOST_FRAMES // 2), 1)]
+            if frame.snapped is not None
+        ]
         for each in (known, asked)
-        for frame in each[:: max(len(each) // (MOST_FRAMES // 2), 1)]
-        if frame.snapped is not None
-    ]
-    return find_shared_pitch(both, pitch, policy) is not None
+    )
+    if not before or not behind:
+        return False
+    height, width = behind[0].size
+    size = ImageSize(width, height)
+    painted = [make_paint_sightings(snapped) for snapped in (*before, *behind)]
+    shown = find_tripod_pitch(painted, size, pitch, policy)
+    if shown is None:
+        return False
+    # A few frames beside many hardly move the tripod: they are judged by themselves.
+    errors = [shown.error_px(each, shown.fit_camera(each)[0]) for each in painted[len(before) :]]
+    alone = [snapped.error_px for snapped in behind]
+    return not do_cameras_travel(np.array(errors), np.array(alone), size)
 
 
 def _propagate_camera(

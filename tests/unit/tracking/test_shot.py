@@ -12,9 +12,10 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.tracking import shot, shot_solve
 from app.tracking.clip import Clip
-from app.tracking.follow import LOST, TRACKED, TrackedFrame
+from app.tracking.follow import BRIDGED, LOST, TRACKED, TrackedFrame
 from app.tracking.shot import (
     FollowedShot,
+    _drop_cameras_of_unconfirmed_runs,
     _follow_run,
     _is_at_key_frame_position,
     _propagate_camera,
@@ -90,6 +91,38 @@ def test_wrong_cameras_behind_a_run_give_way_to_those_that_agree_better(
     _follow_run(clip, shot, run, PITCH, POLICY)
     assert shot.frames[behind].outcome == TRACKED
     assert off_px(film, clip, shot.frames[behind]) < NEAR_PX
+
+
+def test_a_run_without_paint_behind_a_gap_has_no_cameras(
+    followed: tuple[Clip, FollowedShot],
+) -> None:
+    clip, frames = followed[0], [*followed[1].frames]
+    first = len(frames) - 3
+    frames[first - 1] = TrackedFrame(first - 1, frames[first - 1].time, LOST)
+    for number in range(first, len(frames)):
+        frames[number] = replace(frames[number], outcome=BRIDGED, is_key=False)
+    _drop_cameras_of_unconfirmed_runs(clip, frames, PITCH, POLICY)
+    assert {(frame.outcome, frame.camera) for frame in frames[first:]} == {(LOST, None)}
+
+
+@pytest.mark.parametrize("found", [True, False])
+def test_a_run_behind_a_gap_stays_where_a_search_finds_its_camera(
+    followed: tuple[Clip, FollowedShot], found: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clip, frames = followed[0], [*followed[1].frames]
+    first = len(frames) - 4
+    frames[first - 1] = TrackedFrame(first - 1, frames[first - 1].time, LOST)
+    for number in range(first, len(frames)):
+        frames[number] = replace(frames[number], is_key=False)
+    for name, answer in (
+        ("_is_at_key_frame_position", False),
+        ("_stand_on_one_tripod", False),
+        ("_is_proposed", found),
+    ):
+        monkeypatch.setattr(shot, name, lambda *_, answer=answer: answer)
+    _drop_cameras_of_unconfirmed_runs(clip, frames, PITCH, POLICY)
+    assert [frame.outcome for frame in frames[first:]] == [TRACKED if found else LOST] * 4
+    assert any(frame.is_key for frame in frames[first:]) is found
 
 
 def test_an_annotated_frame_never_gives_way(followed: tuple[Clip, FollowedShot]) -> None:

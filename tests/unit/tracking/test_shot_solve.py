@@ -33,22 +33,26 @@ HALF = SMALL.diagonal / 2
 COUNT = 12
 
 
-def posed(number: int, speed_m: float = 0.0) -> Camera:
+def posed(number: int, speed_m: float = 0.0, aside_m: float = 0.0) -> Camera:
     parameters = parameters_from_camera(TRUE, HALF)
-    parameters[X] += speed_m * number
+    parameters[X] += speed_m * number + aside_m
     parameters[PAN] += np.radians(0.4) * number
     parameters[LOG_FOCAL] += 0.004 * number
     return camera_from_parameters(parameters, TRUE.principal_point, HALF)
 
 
 def shot(
-    rng: np.random.Generator, off_m: float, speed_m: float = 0.0, count: int = COUNT
+    rng: np.random.Generator,
+    off_m: float,
+    speed_m: float = 0.0,
+    count: int = COUNT,
+    aside_m: float = 0.0,
 ) -> tuple[list[TrackedFrame], list[BackgroundMatches | None]]:
     """Frames whose cameras were found up to metres off, and the paint and background that they saw."""
     frames: list[TrackedFrame] = []
     matches: list[BackgroundMatches | None] = []
     for number in range(count):
-        truth = posed(number, speed_m)
+        truth = posed(number, speed_m, aside_m)
         parameters = parameters_from_camera(truth, HALF)
         moved = rng.normal(0, off_m, 3)
         parameters[X : Z + 1] += moved
@@ -138,16 +142,21 @@ def test_bridged_frames_of_a_camera_that_travels_lie_between_those_beside_them()
         assert own[X, X] > tracked[X, X]
 
 
-@pytest.mark.parametrize(("speed_m", "same"), [(0.0, True), (0.4, False)])
+@pytest.mark.parametrize(
+    ("aside_m", "count", "same"),
+    [(0.0, 2, True), (0.0, 20, True), (4.0, 3, False), (15.0, 1, False), (15.0, 20, False)],
+)
 def test_frames_behind_a_gap_stand_on_the_tripod_of_those_before_it_or_do_not(
-    speed_m: float, same: bool
+    aside_m: float, count: int, same: bool
 ):
-    frames, _ = shot(np.random.default_rng(7), 0.05, 0.0, 16)
+    frames, _ = shot(np.random.default_rng(7), 0.05, count=16)
     frames[5] = replace(frames[5], is_key=True)
-    later, _ = shot(np.random.default_rng(8), 0.05, speed_m, 40)
-    gap = [replace(frame, outcome=LOST, camera=None, snapped=None) for frame in later[16:20]]
-    both = [*frames, *gap, *later[20:]]
-    assert _stand_on_one_tripod(both, later[20:], Pitch(), CalibrationPolicy()) is same
+    later, _ = shot(np.random.default_rng(8), 0.05, count=18 + count, aside_m=aside_m)
+    gap = [replace(frame, outcome=LOST, camera=None, snapped=None) for frame in later[16:18]]
+    asked = later[18:]
+    both = [*frames, *gap, *asked]
+    assert _stand_on_one_tripod(both, asked, Pitch(), CalibrationPolicy()) is same
+    assert not _stand_on_one_tripod(both, [], Pitch(), CalibrationPolicy())
 
 
 def test_frames_without_paint_lie_between_those_beside_them_and_lost_ones_stay_lost():
