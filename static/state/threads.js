@@ -7,6 +7,7 @@ import { listen } from '../api/events.js';
 import { ApiError } from '../api/problem.js';
 import { getThreads } from '../api/threads.js';
 import { page, param } from '../lib/router.js';
+import { stored } from '../lib/storage.js';
 import { groupDocument } from './group.js';
 import { refuses } from './rights.js';
 import { pointerPlace } from './workspace.js';
@@ -31,6 +32,20 @@ export const openThreads = computed(() => (threads.value ?? []).filter(({ resolv
 
 /** Where somebody begins to say something; null: nowhere. `time` tells two wishes apart. */
 export const composing = signal(/** @type {{place: PlaceOfComment | null, time: number} | null} */ (null));
+
+/** Comments that are begun and not sent, by the group and the field. */
+const drafts = stored('comment-drafts', /** @type {Record<string, string>} */ ({}), 'sessionStorage');
+
+/** @param {number} group @param {string} field its id: names the thread or the comment @returns {string} "" where nothing is begun */
+export function commentDraft(group, field) {
+	return drafts.value[`${group} ${field}`] ?? '';
+}
+
+/** @param {number} group @param {string} field @param {string} text "": it is sent, or given up */
+export function keepCommentDraft(group, field, text) {
+	const { [`${group} ${field}`]: _, ...rest } = drafts.value;
+	drafts.value = text.trim() ? { ...rest, [`${group} ${field}`]: text } : rest;
+}
 
 /** Say something where the pointer is, or about the group. */
 export function compose() {

@@ -182,6 +182,19 @@ class TestLooking:
         thread.get_by_role("button", name="Delete").click()
         expect(thread).to_have_count(0)
 
+    def test_a_comment_that_is_begun_outlives_escape_and_a_reload(self, review: Review) -> None:
+        screen = review(1)
+        screen.press("Shift+n")
+        field = screen.page.locator("#comment-new")
+        expect(field).to_be_focused()
+        screen.page.keyboard.type("half a sent")
+        screen.press("Escape")
+        screen.page.reload()
+        expect(field).to_have_value("half a sent")
+        field.fill("")
+        screen.page.reload()
+        expect(field).to_have_value("")
+
     def test_single_letters_can_be_switched_off(self, review: Review) -> None:
         screen = review(1)
         screen.press("?")

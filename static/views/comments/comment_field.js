@@ -1,5 +1,5 @@
 // @ts-check
-/** Where a comment is written: Ctrl+Enter sends it, @ completes the names of people who see the group. */
+/** Where a comment is written: Ctrl+Enter sends it, @ completes the names of people who see the group. What is not sent stays as a draft. */
 
 import { html } from 'htm/preact';
 import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
@@ -7,6 +7,7 @@ import { useEffect, useLayoutEffect, useRef, useState } from 'preact/hooks';
 import { getPeopleOfGroup } from '../../api/threads.js';
 import { useAttempt } from '../../lib/attempt.js';
 import { completed, nameBefore } from '../../state/mentions.js';
+import { commentDraft, keepCommentDraft } from '../../state/threads.js';
 import { FormError } from '../form_error.js';
 
 /** @typedef {{letter: string, view: string, at: {x: number, y: number}}} PlaceOfComment   image pixels */
@@ -37,16 +38,18 @@ export function CommentField({ id, group, label, button, text = '', focus, send,
 	const [names, setNames] = useState(/** @type {string[]} */ ([]));
 	const [active, setActive] = useState(0);
 	const { error, busy, attempt } = useAttempt();
+	const [begun] = useState(() => commentDraft(group, id) || text);
+	const keep = () => keepCommentDraft(group, id, field.current?.value ?? '');
 	useLayoutEffect(() => { if (focus) field.current?.focus(); }, [focus]);
 	// Buttons included, also once what was said above has grown.
 	useEffect(() => { if (field.current && field.current === document.activeElement) field.current.form?.scrollIntoView({ block: 'nearest' }); });
 
 	async function offer() {
 		const at = field.current;
-		const begun = at && nameBefore(at.value, at.selectionStart);
-		if (begun === null || begun === undefined) { setNames([]); return; }
+		const name = at && nameBefore(at.value, at.selectionStart);
+		if (name === null || name === undefined) { setNames([]); return; }
 		const people = await peopleOf(group);
-		setNames(people.filter((name) => name.startsWith(begun)).slice(0, OFFERED));
+		setNames(people.filter((one) => one.startsWith(name)).slice(0, OFFERED));
 		setActive(0);
 	}
 	/** @param {string} name */
@@ -57,6 +60,7 @@ export function CommentField({ id, group, label, button, text = '', focus, send,
 		at.value = value;
 		at.setSelectionRange(caret, caret);
 		at.focus();
+		keep();
 		setNames([]);
 	}
 	/** @param {Event} [event] */
@@ -67,7 +71,10 @@ export function CommentField({ id, group, label, button, text = '', focus, send,
 		const said = written.trim();
 		if (!at || !said || busy) { at?.focus(); return; }
 		// What was typed meanwhile stays.
-		attempt(send(said), () => { if (at.value.startsWith(written)) at.value = at.value.slice(written.length).trimStart(); });
+		attempt(send(said), () => {
+			if (at.value.startsWith(written)) at.value = at.value.slice(written.length).trimStart();
+			keepCommentDraft(group, id, at.value);
+		});
 	}
 	/** @param {KeyboardEvent} event */
 	function key(event) {
@@ -85,9 +92,9 @@ export function CommentField({ id, group, label, button, text = '', focus, send,
 		<form class="talk__form" onSubmit=${submit}>
 			<label class="hidden-text" for=${id}>${label}</label>
 			<textarea
-				class="field talk__field" id=${id} ref=${field} rows="2" maxlength=${LONGEST} placeholder=${`${label}; @ mentions a person`} defaultValue=${text}
+				class="field talk__field" id=${id} ref=${field} rows="2" maxlength=${LONGEST} placeholder=${`${label}; @ mentions a person`} defaultValue=${begun}
 				aria-autocomplete="list" aria-controls=${names.length ? list : undefined} aria-activedescendant=${names.length ? `${list}-${active}` : undefined}
-				onInput=${offer} onKeyDown=${key} onBlur=${() => setTimeout(() => setNames([]), 150)}
+				onInput=${() => { keep(); offer(); }} onKeyDown=${key} onBlur=${() => setTimeout(() => setNames([]), 150)}
 			></textarea>
 			${names.length ? html`
 				<ul class="talk__names" id=${list} role="listbox" aria-label="People">
@@ -96,7 +103,7 @@ export function CommentField({ id, group, label, button, text = '', focus, send,
 			${error ? html`<${FormError} error=${error} />` : null}
 			<p class="talk__buttons">
 				<button class="button button--small" type="submit" data-needs="annotate" aria-disabled=${busy}>${button} <kbd>Ctrl ⏎</kbd></button>
-				${cancel ? html`<button class="button button--small" type="button" onClick=${cancel}>Cancel</button>` : null}
+				${cancel ? html`<button class="button button--small" type="button" onClick=${() => { keepCommentDraft(group, id, ''); cancel(); }}>Cancel</button>` : null}
 			</p>
 		</form>
 	`;

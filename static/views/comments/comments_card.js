@@ -10,7 +10,7 @@ import { param } from '../../lib/router.js';
 import { partsOf } from '../../state/mentions.js';
 import { historyAddress } from '../../state/navigation.js';
 import { complain } from '../../state/notice.js';
-import { composing, openThreads, readThreads, threads } from '../../state/threads.js';
+import { commentDraft, composing, openThreads, readThreads, threads } from '../../state/threads.js';
 import { focusView } from '../../state/workspace.js';
 import { Letter } from '../letter.js';
 import { Term } from '../term.js';
@@ -49,7 +49,7 @@ function Comment({ group, thread, one }) {
 		<li>
 			<p class="talk__who"><${Who} actor=${one.actor} /> <${When} at=${one.at} />${one.edited && one.text !== null ? ' · edited' : ''}
 				${one.mine && one.text !== null ? html`<span class="talk__own">
-					<button class="link-button" type="button" data-needs="annotate" onClick=${() => setChanging(true)}>Edit<span class="hidden-text"> your comment</span></button>
+					<button class="link-button" type="button" data-needs="annotate" onClick=${() => setChanging(true)}>Edit${commentDraft(group, `comment-${one.id}`) ? ' (draft)' : ''}<span class="hidden-text"> your comment</span></button>
 					<button class="link-button" type="button" data-needs="annotate" onClick=${() => act(group, deleteComment(group, thread, one.id))}>Delete<span class="hidden-text"> your comment</span></button>
 				</span>` : null}
 			</p>
@@ -82,7 +82,7 @@ function Thread({ group, thread }) {
 				id=${`reply-${thread.id}`} group=${group.id} label="Reply" button="Reply" focus=${true} cancel=${() => setReplying(false)}
 				send=${async (/** @type {string} */ text) => { await postReply(group.id, thread.id, text); setReplying(false); await readThreads(group.id); }}
 			/>` : html`<p class="talk__buttons">
-				<button class="button button--small" type="button" data-needs="annotate" onClick=${() => setReplying(true)}>Reply</button>
+				<button class="button button--small" type="button" data-needs="annotate" onClick=${() => setReplying(true)}>Reply${commentDraft(group.id, `reply-${thread.id}`) ? ' (draft)' : ''}</button>
 				<button class="button button--small" type="button" data-needs="annotate" onClick=${() => act(group.id, patchThread(group.id, thread.id, !settled))}>${settled ? 'Open again' : 'Resolve'}</button>
 			</p>`}
 		</li>
