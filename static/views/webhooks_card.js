@@ -11,6 +11,7 @@ import { withForm } from '../lib/field.js';
 import { useResource } from '../lib/resource.js';
 import { whyNot } from '../state/rights.js';
 import { CopyField } from './copy_field.js';
+import { ConfirmButton } from './evaluation/confirm_button.js';
 import { FormError } from './form_error.js';
 import { Trouble } from './page_frame.js';
 import { Term } from './term.js';
@@ -115,8 +116,8 @@ function WebhookItem({ dataset, one, act, show }) {
 					<button class="button button--small" type="button" aria-expanded=${open} onClick=${() => setOpen(!open)}>Messages<span class="hidden-text"> to ${one.url}</span></button>
 					${one.off ? null : html`<button class="button button--small" type="button" onClick=${() => { setOpen(true); act(pingWebhook(dataset, one.id)); }}>Send a test<span class="hidden-text"> to ${one.url}</span></button>`}
 					<button class="button button--small" type="button" onClick=${() => act(patchWebhook(dataset, one.id, { on: one.off !== null }))}>${one.off ? 'Turn on' : 'Turn off'}<span class="hidden-text"> ${one.url}</span></button>
-					<button class="button button--small" type="button" onClick=${renew}>New secret<span class="hidden-text"> for ${one.url}</span></button>
-					<button class="button button--small button--danger" type="button" onClick=${() => act(deleteWebhook(dataset, one.id))}>Delete<span class="hidden-text"> ${one.url}</span></button>
+					<${ConfirmButton} small=${true} label="New secret" question="Replace the secret? The old one ends." what=${`for ${one.url}`} run=${renew} />
+					<${ConfirmButton} small=${true} label="Delete" question="Delete it with its messages?" what=${one.url} run=${() => act(deleteWebhook(dataset, one.id))} />
 				</span>
 			</div>
 			${open ? html`<${Deliveries} dataset=${dataset} one=${one} act=${act} />` : null}

@@ -35,4 +35,5 @@ def test_a_lead_sees_that_nobody_takes_the_messages(
     expect(card.get_by_text("a person turned it off")).to_be_visible()
     assert secret not in page.content()
     card.get_by_role("button", name="Delete").click()
+    card.get_by_role("button", name="Delete it with its messages?").click()
     expect(card.get_by_role("listitem")).to_have_count(0)

@@ -4,8 +4,11 @@
 import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
-/** @param {{label: string, question: string, what: string, small?: boolean, run: () => void}} props `what`: for who hears the page */
-export function ConfirmButton({ label, question, what, small = false, run }) {
+/**
+ * @param {{label: string, question: string, what: string, small?: boolean, needs?: 'lead' | 'annotate', of?: string, run: () => void}} props
+ *   what: for who hears the page; of: the dataset in which one needs the right
+ */
+export function ConfirmButton({ label, question, what, small = false, needs = 'lead', of, run }) {
 	const [asked, setAsked] = useState(false);
 	function press() {
 		setAsked(!asked);
@@ -13,7 +16,7 @@ export function ConfirmButton({ label, question, what, small = false, run }) {
 	}
 	return html`
 		<button
-			data-needs="lead" class=${`button ${small ? 'button--small ' : ''}${asked || !small ? 'button--danger' : ''}`} type="button" aria-live="polite"
+			data-needs=${needs} data-of=${of} class=${`button ${small ? 'button--small ' : ''}${asked || !small ? 'button--danger' : ''}`} type="button" aria-live="polite"
 			onClick=${press} onBlur=${() => setAsked(false)}
 		>${asked ? question : label}<span class="hidden-text"> ${what}</span></button>
 	`;

@@ -14,6 +14,7 @@ import { dataset, datasets, loadDatasets } from '../../state/datasets.js';
 import { isOver } from '../../state/jobs.js';
 import { lengthText } from '../../state/shots.js';
 import { addVideos, videoUploads } from '../../state/video_uploads.js';
+import { ConfirmButton } from '../evaluation/confirm_button.js';
 import { FormError } from '../form_error.js';
 import { JobProgress } from '../job_progress.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
@@ -35,6 +36,8 @@ export function factsOf({ width, height, fps, variable, interlaced, damaged, sec
 	].filter(Boolean).join(' · ');
 }
 
+const REMOVES = 'Remove with its shots, tracked cameras, links and followed balls? Its file and its groups stay.';
+
 /** @param {{one: RecordingJson, remove: () => void}} props */
 function Row({ one, remove }) {
 	return html`
@@ -44,7 +47,7 @@ function Row({ one, remove }) {
 			<td data-numeric="true">${count(one.shots)}</td>
 			<td data-numeric="true">${count(one.groups)}</td>
 			<td><${When} at=${one.created} /></td>
-			<td><span class="table__actions"><button class="button button--small" type="button" data-needs="lead" data-of=${one.dataset} title="Its file and its groups stay" onClick=${remove}>Remove<span class="hidden-text"> ${one.name}</span></button></span></td>
+			<td><span class="table__actions"><${ConfirmButton} small=${true} of=${one.dataset} label="Remove" question=${REMOVES} what=${one.name} run=${remove} /></span></td>
 		</tr>
 	`;
 }
