@@ -101,7 +101,7 @@ export function getTrackAround(id, frame, signal) {
 	return request(`/tracks/${id}/around${queryText({ frame })}`, { signal });
 }
 
-/** @param {TrackJson} track @param {{verdict?: 'accepted' | 'rejected' | 'none', corrections?: Correction[]}} body @returns {Promise<TrackJson>} */
+/** @param {TrackJson} track @param {{verdict?: 'accepted' | 'rejected' | 'none', note?: string, corrections?: Correction[]}} body @returns {Promise<TrackJson>} */
 export async function patchTrack({ id, etag }, body) {
 	return (await requestTagged(`/tracks/${id}`, { method: 'PATCH', body, etag, key: idempotencyKey() })).json;
 }

@@ -1,10 +1,14 @@
 // @ts-check
 /** What a track is drawn from: runs of modes, curves with their bands, and corrections of its events. */
 
-/** @import {BallMode, BallState, Correction, EventKind, TrackEvent, TrackFrames, TrackJump} from '../api/tracks.js' */
+/** @import {BallMode, BallState, Correction, EventKind, TrackEvent, TrackFrames, TrackJson, TrackJump} from '../api/tracks.js' */
+/** @typedef {Pick<TrackJson, 'verdict' | 'note' | 'corrections'>} TrackReview what people say of a track */
+/** @typedef {{track: number, dataset: string, before: TrackReview, after: TrackReview}} TrackChange */
 
 /** Frames between an event and the frame that somebody means by it; as the server takes it. */
 export const NEAR = 3;
+/** Changes that can be undone. */
+const KEPT = 100;
 
 /** What a state is called, and the shade of its run. */
 export const STATES = /** @type {Record<BallState, string>} */ ({
@@ -96,4 +100,40 @@ export function corrected(corrections, one) {
 	const rest = corrections.filter((other) => other.kind !== one.kind || Math.abs(other.frame - one.frame) > NEAR);
 	const undone = rest.length < corrections.length && corrections.some((other) => other.kind === one.kind && other.added !== one.added && Math.abs(other.frame - one.frame) <= NEAR);
 	return undone && !one.added ? rest : [...rest, one];
+}
+
+/** What was said of tracks in this window, the last one last. @type {TrackChange[]} */
+const trackChanges = [];
+
+/** The last change of a track of a dataset. @param {string} dataset */
+export function lastTrackChange(dataset) {
+	return trackChanges.findLast((change) => change.dataset === dataset);
+}
+
+/** @param {TrackChange} change */
+export function forgetTrackChange(change) {
+	trackChanges.splice(trackChanges.indexOf(change), 1);
+}
+
+/** @param {TrackJson} before @param {TrackJson} after */
+export function rememberTrack(before, after) {
+	trackChanges.push({ track: after.id, dataset: after.dataset, before, after });
+	if (trackChanges.length > KEPT) trackChanges.shift();
+}
+
+/**
+ * What takes a change back.
+ *
+ * @param {TrackChange} change @param {TrackReview} present
+ * @returns {{verdict?: 'accepted' | 'rejected' | 'none', note?: string, corrections?: Correction[]} | null} null: the track says something else by now
+ */
+export function undoOfTrack({ before, after }, { verdict, corrections }) {
+	/** @param {Correction[]} list */
+	const text = (list) => JSON.stringify(list.map(({ frame, kind, added }) => [frame, kind, added]));
+	if (verdict !== after.verdict || text(corrections) !== text(after.corrections)) return null;
+	return {
+		...(before.verdict === verdict ? {} : { verdict: before.verdict ?? 'none' }),
+		...(before.verdict !== verdict && before.note ? { note: before.note } : {}),
+		...(text(before.corrections) === text(corrections) ? {} : { corrections: before.corrections }),
+	};
 }

@@ -108,6 +108,33 @@ class TestTracks:
         page.keyboard.press("u")
         expect(page.get_by_text("no verdict yet")).to_be_visible()
 
+    def test_what_was_said_of_one_is_undone_and_removed_events_are_restored(
+        self, track: Page
+    ) -> None:
+        page = track
+        events = page.get_by_role("list", name="List of events").get_by_role("button")
+        removed = page.get_by_role("list", name="Removed events").get_by_role("listitem")
+        before = events.count()
+        events.filter(has_text="kick").first.click()
+        page.keyboard.press("d")
+        expect(removed).to_contain_text("removed: kick")
+        expect(events).to_have_count(before - 1)
+        page.keyboard.press("Control+z")
+        expect(removed).to_have_count(0)
+        expect(events).to_have_count(before)
+        page.keyboard.press("d")
+        removed.get_by_role("button", name="Restore").click()
+        expect(events).to_have_count(before)
+        page.keyboard.press("a")
+        accept = page.get_by_role("button", name="Accept")
+        expect(accept).to_have_attribute("aria-pressed", "true")
+        page.keyboard.press("Control+z")
+        expect(accept).to_have_attribute("aria-pressed", "false")
+        for _ in range(3):
+            page.keyboard.press("Control+z")
+        expect(page.get_by_text("nothing to undo")).to_be_visible()
+        expect(events).to_have_count(before)
+
     def test_corrections_in_a_row_build_on_each_other(self, track: Page) -> None:
         number = track.url.split("/tracks/")[1].split("?")[0]
         track.goto(f"/tracks/{number}?frame={FIRST + 5}")

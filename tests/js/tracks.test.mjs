@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
-import { contradictedAfter, corrected, curvesOf, eventAt, eventBy, mostShown, partOf, runsOf } from '../../static/state/tracks.js';
+import { contradictedAfter, corrected, curvesOf, eventAt, eventBy, forgetTrackChange, lastTrackChange, mostShown, partOf, rememberTrack, runsOf, undoOfTrack } from '../../static/state/tracks.js';
 
 const EVENTS = [{ frame: 10, kind: 'kick' }, { frame: 14, kind: 'bounce' }, { frame: 30, kind: 'out' }];
 const FRAMES = {
@@ -70,5 +70,32 @@ describe('corrected', () => {
 	it('replaces what was said of the same event', () => {
 		assert.deepEqual(corrected([removed], added), [added]);
 		assert.deepEqual(corrected([added], { ...removed, frame: 40 }), [added, { ...removed, frame: 40 }]);
+	});
+});
+
+describe('undo of a track', () => {
+	const bounce = { frame: 148, kind: 'bounce', added: false };
+	const track = (/** @type {any} */ said) => /** @type {any} */ ({ id: 1, dataset: 'a', verdict: null, note: null, corrections: [], ...said });
+	it('sends what the track said before, and nothing else', () => {
+		const [plain, removed] = [track({}), track({ corrections: [bounce] })];
+		rememberTrack(plain, removed);
+		const change = lastTrackChange('a');
+		assert.deepEqual(undoOfTrack(change, removed), { corrections: [] });
+		forgetTrackChange(change);
+		assert.equal(lastTrackChange('a'), undefined);
+		const rejected = track({ verdict: 'rejected', note: 'too short' });
+		assert.deepEqual(undoOfTrack({ track: 1, dataset: 'a', before: plain, after: rejected }, rejected), { verdict: 'none' });
+		assert.deepEqual(undoOfTrack({ track: 1, dataset: 'a', before: rejected, after: plain }, plain), { verdict: 'rejected', note: 'too short' });
+	});
+	it('leaves what somebody else said since', () => {
+		const [plain, accepted] = [track({}), track({ verdict: 'accepted' })];
+		const change = { track: 1, dataset: 'a', before: plain, after: accepted };
+		assert.equal(undoOfTrack(change, track({ verdict: 'rejected' })), null);
+		assert.equal(undoOfTrack(change, track({ verdict: 'accepted', corrections: [bounce] })), null);
+	});
+	it('stays in its dataset', () => {
+		rememberTrack(track({ id: 2, dataset: 'b' }), track({ id: 2, dataset: 'b', verdict: 'accepted' }));
+		assert.equal(lastTrackChange('a'), undefined);
+		assert.equal(lastTrackChange('b')?.track, 2);
 	});
 });

@@ -2,6 +2,7 @@
 /** Keys of the page of a track. */
 
 import { navigate } from '../../lib/router.js';
+import { inform } from '../../state/notice.js';
 import { contradictedAfter, eventAt, eventBy, EVENTS } from '../../state/tracks.js';
 
 /** @import {EventKind, TrackFrames, TrackJson} from '../../api/tracks.js' */
@@ -16,6 +17,7 @@ import { contradictedAfter, eventAt, eventBy, EVENTS } from '../../state/tracks.
  * @property {TrackPlayer} player
  * @property {(verdict: 'accepted' | 'rejected' | 'none') => void} judge
  * @property {(kind: EventKind, added: boolean) => void} correct
+ * @property {() => void} undo
  * @property {(by: number) => void} zoom
  * @property {() => void} switchView
  * @property {() => Promise<void>} goOn
@@ -69,6 +71,8 @@ export function keysOfTrack(doing) {
 		{ keys: ['d'], label: 'Remove the event at this frame', group: say, needs: 'review', run: () => {
 			const event = eventAt(doing.current.frames?.events ?? [], doing.current.at);
 			if (event) doing.current.correct(event.kind, false);
+			else inform('There is no event near this frame to remove.');
 		} },
+		{ keys: ['Ctrl+z'], label: 'Undo the last verdict or change of events, also of the track before', group: say, needs: 'review', run: () => doing.current.undo() },
 	];
 }

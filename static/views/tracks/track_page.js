@@ -13,19 +13,21 @@ import { latest } from '../../lib/latest.js';
 import { useResource } from '../../lib/resource.js';
 import { address, navigate, page, param, place } from '../../lib/router.js';
 import { stored } from '../../lib/storage.js';
+import { useDataset } from '../../state/datasets.js';
 import { me } from '../../state/me.js';
 import { announce, complain, dismiss, inform } from '../../state/notice.js';
 import { listValues, nextOpen, trackAddress } from '../../state/track_list.js';
 import { makeTrackPlayer, PACES } from '../../state/track_player.js';
-import { amid, contradictedAfter, corrected, curvesOf, eventAt, EVENTS, jumpText, MODES, mostShown, partOf, runsOf, STATES } from '../../state/tracks.js';
+import { amid, contradictedAfter, corrected, curvesOf, eventAt, EVENTS, forgetTrackChange, jumpText, lastTrackChange, MODES, mostShown, partOf, rememberTrack, runsOf, STATES, undoOfTrack } from '../../state/tracks.js';
 import { Chart, Numbers } from '../chart.js';
 import { pageAddress } from '../dataset_menu.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
+import { EventCard } from './event_card.js';
 import { keysOfTrack } from './track_keys.js';
 import { TrackSpace } from './track_scene.js';
 import { verdictText } from './tracks_page.js';
 
-/** @import {EventKind, TrackAround, TrackFrames, TrackJson} from '../../api/tracks.js' */
+/** @import {Correction, EventKind, TrackAround, TrackFrames, TrackJson} from '../../api/tracks.js' */
 /** @import {TrackPlayer} from '../../state/track_player.js' */
 /** @import {Curve} from '../chart.js' */
 
@@ -165,7 +167,7 @@ function FrameCard({ track, frames, around, at, goTo }) {
 			${around ? html`<${Now} around=${around} at=${at} />` : null}
 			<p class="buttons">
 				${group === null ? html`<button class="button" type="button" aria-disabled="true" title="No group shows this frame">Open the group</button>` : html`<a class="button" href=${`/review/${group}`}>Open the group <kbd>Enter</kbd></a>`}
-				${worst === null ? null : html`<button class="button" type="button" title="The frame with the largest left-out error" onClick=${() => goTo(worst)}>Worst frame <kbd>w</kbd></button>`}
+				${worst === null ? null : html`<button class="button" type="button" title="The frame with the largest left-out error" onClick=${() => goTo(worst)}>Worst frame <kbd>W</kbd></button>`}
 			</p>
 		</section>
 	`;
@@ -184,27 +186,10 @@ function VerdictCard({ track, judge, toContradicted }) {
 			<p class="note">${summary.median_px === null ? 'No ball could be left out to measure the error' : `Error of left-out balls: median ${fixed(summary.median_px, 1)} px, 95 % within ${fixed(summary.p95_px, 1)} px`}. Made from ${plural(summary.measurements, 'ball')} of all views${summary.contradicted ? html`; <button class="link-button" type="button" title="The next frame with a ball that contradicts the track (c)" onClick=${toContradicted}>${summary.contradicted} ${summary.contradicted === 1 ? 'contradicts' : 'contradict'} the track</button>` : null}.</p>
 			${(summary.median_px ?? 0) > CLICK_PX ? html`<p class="note">Left-out balls are predicted less exactly than a click: the cameras contradict each other. An adjustment to lines and balls (<code>touchline rig</code>) may bring them together.</p>` : null}
 			<p class="buttons">
-				<button class="button" type="button" data-needs="review" data-of=${track.dataset} aria-pressed=${track.verdict === 'accepted'} aria-disabled=${why !== ''} title=${why} onClick=${() => { if (!why) press('accepted'); }}>Accept <kbd>a</kbd></button>
-				<button class="button" type="button" data-needs="review" data-of=${track.dataset} aria-pressed=${track.verdict === 'rejected'} onClick=${() => press('rejected')}>Reject <kbd>x</kbd></button>
+				<button class="button" type="button" data-needs="review" data-of=${track.dataset} aria-pressed=${track.verdict === 'accepted'} aria-disabled=${why !== ''} title=${why} onClick=${() => { if (!why) press('accepted'); }}>Accept <kbd>A</kbd></button>
+				<button class="button" type="button" data-needs="review" data-of=${track.dataset} aria-pressed=${track.verdict === 'rejected'} onClick=${() => press('rejected')}>Reject <kbd>X</kbd></button>
 			</p>
 			${track.stale ? html`<p class="note">${why}: <a class="link" href=${pageAddress(track.dataset, 'tracks')}>tracks of ${track.dataset}</a>.</p>` : null}
-		</section>
-	`;
-}
-
-/** @param {{frames: TrackFrames, at: number, goTo: (frame: number) => void, correct: (kind: EventKind, added: boolean) => void}} props */
-function EventCard({ frames, at, goTo, correct }) {
-	const event = eventAt(frames.events, at);
-	return html`
-		<section class="card" aria-labelledby="events-title">
-			<h2 id="events-title">Events <small>${frames.events.length}</small></h2>
-			<p class="buttons">
-				${EVENTS.map(({ kind, key }) => html`<button key=${kind} class="button button--small" type="button" data-needs="review" onClick=${() => correct(kind, true)}>Add ${kind} <kbd>${key}</kbd></button>`)}
-				<button class="button button--small" type="button" data-needs="review" aria-disabled=${!event} title=${event ? '' : 'No event is near this frame'} onClick=${() => { if (event) correct(event.kind, false); }}>Remove${event ? ` ${event.kind}` : ''} <kbd>d</kbd></button>
-			</p>
-			<ol class="track__list" aria-label="List of events">
-				${frames.events.map((one) => html`<li key=${`${one.frame} ${one.kind}`}><button class="track__event" type="button" aria-current=${one === event ? 'true' : undefined} onClick=${() => goTo(one.frame)}><span class="mono">${one.frame}</span> ${one.kind}${one.added ? ' (added)' : ''}</button></li>`)}
-			</ol>
 		</section>
 	`;
 }
@@ -291,10 +276,12 @@ function Track({ track, setTrack }) {
 	/** @param {(present: TrackJson) => Parameters<typeof patchTrack>[1]} make of the last answer @param {string} told @returns {Promise<boolean>} whether it is saved */
 	async function sendNow(make, told) {
 		try {
-			const changed = await patchTrack(newest.current, make(newest.current));
-			keep(changed);
+			const before = newest.current;
+			const after = await patchTrack(before, make(before));
+			keep(after);
+			rememberTrack(before, after);
 			// A notice that no track waits for a verdict is no longer true.
-			if (!changed.verdict) dismiss();
+			if (!after.verdict) dismiss();
 			announce(told);
 			return true;
 		} catch (problem) {
@@ -318,6 +305,8 @@ function Track({ track, setTrack }) {
 		sending.current = sent.then(() => {});
 		return sent;
 	}
+	/** @param {Correction} one */
+	const restore = (one) => { if (isHere()) send((present) => ({ corrections: present.corrections.filter((other) => other.added || other.frame !== one.frame || other.kind !== one.kind) }), `Restored the ${one.kind} of frame ${one.frame}.`); };
 	/** @param {'accepted' | 'rejected' | 'none'} verdict */
 	async function judge(verdict) {
 		if (judging.current || !isHere()) return;
@@ -327,14 +316,39 @@ function Track({ track, setTrack }) {
 		// Who takes it back meanwhile stays.
 		if (saved && verdict !== 'none' && isHere()) await goOn(() => !judging.current && newest.current.verdict === verdict);
 	}
+	/** Take the last verdict or correction back, also that of the track before, which is shown then. */
+	async function undoNow() {
+		if (!isHere()) return;
+		const change = lastTrackChange(track.dataset);
+		if (!change) { inform('There is nothing to undo.'); return; }
+		try {
+			const present = change.track === track.id ? newest.current : await getTrack(change.track);
+			const body = undoOfTrack(change, present);
+			if (body) keepUndone(await patchTrack(present, body));
+			else complain(`The track ${present.key} was changed after that, so it is not undone.`);
+			forgetTrackChange(change);
+		} catch (problem) {
+			if (!(problem instanceof ApiError)) throw problem;
+			complain(`It is not undone: ${problem.message}`);
+			if (!problem.isPassing) forgetTrackChange(change);
+			if (problem.status === 412) await readAgain();
+		}
+	}
+	/** @param {TrackJson} undone */
+	function keepUndone(undone) {
+		announce('Undone.');
+		if (undone.id === track.id) keep(undone);
+		else if (isHere()) navigate(trackAddress(undone.id, listValues(place.peek().search)));
+	}
+	const undo = () => { sending.current = sending.current.then(undoNow); };
 	/** @param {EventKind} kind @param {boolean} added */
 	const correct = (kind, added) => {
 		if (!isHere()) return;
 		const frame = added ? at : (eventAt(frames?.events ?? [], at)?.frame ?? at);
 		send((present) => ({ corrections: corrected(present.corrections, { frame, kind, added }) }), added ? `Added a ${kind} in frame ${frame}.` : `Removed the ${kind} of frame ${frame}.`);
 	};
-	const doing = useRef({ track, frames, at, player, judge, correct, switchView, goOn, zoom: (/** @type {number} */ by) => setWidth((before) => Math.min(Math.max(Math.round(before * by), 50), track.last - track.first + 1)) });
-	Object.assign(doing.current, { track, frames, at, player, judge, correct, goOn });
+	const doing = useRef({ track, frames, at, player, judge, correct, undo, switchView, goOn, zoom: (/** @type {number} */ by) => setWidth((before) => Math.min(Math.max(Math.round(before * by), 50), track.last - track.first + 1)) });
+	Object.assign(doing.current, { track, frames, at, player, judge, correct, undo, goOn });
 	useKeys(useMemo(() => keysOfTrack(doing), [track.id]));
 	const from = Math.min(Math.max(at - track.first - Math.floor(width / 2), 0), Math.max(track.last - track.first + 1 - width, 0));
 	const part = useMemo(() => frames && partOf(frames, from, from + width - 1), [frames, from, width]);
@@ -357,7 +371,7 @@ function Track({ track, setTrack }) {
 			<div class="track__rail">
 				<${FrameCard} track=${track} frames=${frames} around=${around} at=${at} goTo=${goTo} />
 				<${VerdictCard} track=${track} judge=${judge} toContradicted=${() => { const frame = contradictedAfter(frames.contradicted, at); if (frame !== undefined) goTo(frame); }} />
-				<${EventCard} frames=${frames} at=${at} goTo=${goTo} correct=${correct} />
+				<${EventCard} frames=${frames} removed=${track.corrections.filter(({ added }) => !added)} at=${at} goTo=${goTo} correct=${correct} restore=${restore} />
 			</div>
 		</div>
 	`;
@@ -371,6 +385,7 @@ export function TrackPage() {
 	useEffect(() => setChanged(null), [id]);
 	// The answer about the track before stays until the next one is there: no key may act on it.
 	const track = [changed, found.value].find((one) => one?.id === id) ?? null;
+	useEffect(() => { if (track) useDataset(track.dataset); }, [track?.dataset]);
 	return html`
 		<${PageFrame}
 			current="tracks" title=${track ? `Track of ${track.key}` : 'Track'}
