@@ -5,8 +5,10 @@ import { html } from 'htm/preact';
 import { useEffect, useRef } from 'preact/hooks';
 
 import { listenToGroups } from '../api/events.js';
+import { getJobs } from '../api/jobs.js';
 import { latest } from '../lib/latest.js';
 import { useResource } from '../lib/resource.js';
+import { datasets } from '../state/datasets.js';
 import { JobButton } from './job_button.js';
 import { JobProgress } from './job_progress.js';
 import { useSavePolicy } from './save_policy.js';
@@ -22,14 +24,20 @@ const PAUSE = 3000;
  * @param {(dataset: number, signal: AbortSignal) => Promise<T>} get reads what the card shows
  * @param {number} dataset
  * @param {readonly string[]} concerned kinds of changes of groups after which it is read again
+ * @param {string} [job] kind of its jobs: one that was begun before, or elsewhere, is followed too
  */
-export function useMatchCard(get, dataset, concerned) {
+export function useMatchCard(get, dataset, concerned, job) {
 	const { value, error, reload } = useResource((signal) => get(dataset, signal), [dataset]);
 	useEffect(() => {
 		const reading = latest(PAUSE, async () => reload());
-		const stop = listenToGroups((/** @type {{kind: string}} */ { kind }) => { if (concerned.includes(kind)) reading.run(null); }, () => reading.run(null));
+		/** @param {string | null} changed null: any */
+		const isMine = (changed) => changed === null || changed === datasets.value?.find(({ id }) => id === dataset)?.name;
+		const stop = listenToGroups(
+			(/** @type {{kind: string, dataset: string}} */ told) => { if (concerned.includes(told.kind) && isMine(told.dataset)) reading.run(null); },
+			(changed) => { if (isMine(changed)) reading.run(null); },
+		);
 		return () => { stop(); reading.cancel(); };
-	}, [reload]);
+	}, [reload, dataset]);
 	const card = useRef(/** @type {HTMLElement | null} */ (null));
 	// The button that was pressed goes: whoever is still here, or nowhere, goes on from the heading.
 	const saving = useSavePolicy(() => {
@@ -37,6 +45,14 @@ export function useMatchCard(get, dataset, concerned) {
 		if (!at || at === document.body || card.current?.contains(at)) card.current?.querySelector('h2')?.focus();
 		reload();
 	});
+	useEffect(() => {
+		if (!job) return undefined;
+		const controller = new AbortController();
+		getJobs({ dataset: String(dataset), kind: job, state: 'open', limit: 1 }, controller.signal).then(({ items: [running] }) => {
+			if (running && !controller.signal.aborted) saving.send(async () => running);
+		}, () => {});
+		return () => controller.abort();
+	}, [dataset, job]);
 	return { value, error, reload, card, saving };
 }
 

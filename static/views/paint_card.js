@@ -2,13 +2,10 @@
 /** The paint of a dataset's pictures: how many were read, read them, take that back. */
 
 import { html } from 'htm/preact';
-import { useEffect } from 'preact/hooks';
 
-import { getJobs } from '../api/jobs.js';
 import { getDatasetPaint, readDatasetPaint, revertPaint } from '../api/paint.js';
 import { capital, count, plural } from '../lib/format.js';
 import { matchName } from '../lib/match_name.js';
-import { isOver } from '../state/jobs.js';
 import { pageAddress } from './dataset_menu.js';
 import { JobButton } from './job_button.js';
 import { JobProgress } from './job_progress.js';
@@ -55,17 +52,8 @@ function MatchPaint({ one, used, busy, onRead }) {
 
 /** @param {{dataset: DatasetJson}} props */
 export function PaintCard({ dataset }) {
-	const { value, error, reload, card, saving } = useMatchCard(getDatasetPaint, dataset.id, CONCERNED);
+	const { value, error, reload, card, saving } = useMatchCard(getDatasetPaint, dataset.id, CONCERNED, 'paint');
 	const { job, busy, error: refused, send } = saving;
-	useEffect(() => {
-		// An import may have asked for it, or somebody else.
-		const controller = new AbortController();
-		getJobs({ dataset: dataset.name, limit: 20 }, controller.signal).then(({ items }) => {
-			const running = items.find((one) => one.kind === 'paint' && !isOver(one));
-			if (running && !controller.signal.aborted) send(async () => running);
-		}, () => {});
-		return () => controller.abort();
-	}, [dataset.id]);
 	if (error) return html`<${Trouble} title="The paint cannot be shown" error=${error} retry=${reload} />`;
 	const items = value?.items.filter(({ views, read }) => views > 0 || read > 0) ?? [];
 	const pictures = items.reduce((total, one) => total + one.views - one.without_picture, 0);

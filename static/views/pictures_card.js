@@ -4,9 +4,11 @@
 import { html } from 'htm/preact';
 import { useState } from 'preact/hooks';
 
+import { getJobs } from '../api/jobs.js';
 import { estimateMatchPictures, getMatchPictures, setMatchPicture } from '../api/match_estimates.js';
 import { fixed, plural } from '../lib/format.js';
 import { matchName } from '../lib/match_name.js';
+import { useResource } from '../lib/resource.js';
 import { JobButton } from './job_button.js';
 import { MatchButton, MatchCard, MatchHead, useMatchCard } from './match_card.js';
 import { Trouble } from './page_frame.js';
@@ -54,12 +56,13 @@ function MatchPicture({ one, shown, busy, onSet }) {
 
 /** @param {{dataset: number}} props */
 export function Pictures({ dataset }) {
-	const { value, error, reload, card, saving } = useMatchCard(getMatchPictures, dataset, CONCERNED);
+	const { value, error, reload, card, saving } = useMatchCard(getMatchPictures, dataset, CONCERNED, 'pictures');
 	const { job, busy, error: refused, send } = saving;
-	const [found, setFound] = useState(/** @type {PictureEstimateJson[]} */ ([]));
+	const [found, setFound] = useState(/** @type {PictureEstimateJson[] | null} */ (null));
+	const before = useResource((signal) => getJobs({ dataset: String(dataset), kind: 'pictures', state: 'done', limit: 1 }, signal), [dataset]).value?.items[0];
 	if (error) return html`<${Trouble} title="The pictures cannot be shown" error=${error} retry=${reload} />`;
 	if (!value?.items.length) return null;
-	const shown = job?.kind === 'pictures' && job.state === 'done' ? job.result.items : found;
+	const shown = job?.kind === 'pictures' && job.state === 'done' ? job.result.items : found ?? before?.result?.items ?? [];
 	/** @param {() => Promise<import('../api/jobs.js').JobJson>} put */
 	const ask = (put) => { if (!busy) { setFound(shown); send(put); } };
 	const title = html`Stretched and cropped pictures

@@ -33,7 +33,7 @@ function MatchPosition({ one, used, busy, onShare, onBack }) {
 
 /** @param {{dataset: number}} props */
 export function Positions({ dataset }) {
-	const { value, error, reload, card, saving } = useMatchCard(getPositions, dataset, CONCERNED);
+	const { value, error, reload, card, saving } = useMatchCard(getPositions, dataset, CONCERNED, 'positions');
 	const { job, busy, error: refused, send } = saving;
 	if (error) return html`<${Trouble} title="The positions cannot be shown" error=${error} retry=${reload} />`;
 	const items = value?.items.filter(({ current }) => value.used || current !== null) ?? [];

@@ -51,7 +51,7 @@ function Outcome({ job }) {
 
 /** @param {{dataset: number, name: string}} props */
 export function Proposals({ dataset, name }) {
-	const { value, error, reload, card, saving } = useMatchCard(getProposals, dataset, CONCERNED);
+	const { value, error, reload, card, saving } = useMatchCard(getProposals, dataset, CONCERNED, 'proposals');
 	const { job, busy, error: refused, send } = saving;
 	const [problem, setProblem] = useState('');
 	if (error) return html`<${Trouble} title="The proposals cannot be shown" error=${error} retry=${reload} />`;

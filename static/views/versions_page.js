@@ -8,11 +8,13 @@ import { sentenceOf } from '../api/problem.js';
 import { getVersions, manifestAddress, verifyVersion } from '../api/versions.js';
 import { count, plural, sharePercent } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
-import { follow } from '../state/jobs.js';
+import { follow, jobToShow } from '../state/jobs.js';
 import { datasetPage } from './dataset_frame.js';
 import { ExportDialog } from './export_dialog.js';
 import { FreezeDialog, splitTexts } from './freeze_dialog.js';
+import { JobProgress } from './job_progress.js';
 import { Loading, Trouble } from './page_frame.js';
+import { useEnded, useRunningJobs } from './running_jobs.js';
 import { VerifyReport } from './verify_report.js';
 import { VersionDiff } from './version_diff.js';
 import { When } from './when.js';
@@ -103,6 +105,9 @@ function useVerify(kept) {
 /** @param {{one: DatasetJson}} props */
 function VersionsOf({ one }) {
 	const versions = useResource((signal) => getVersions(one.id, signal), [one.id]);
+	const freezing = useRunningJobs({ dataset: one.name, kind: 'freeze' }, ({ kind, dataset }) => kind === 'freeze' && dataset === one.name).jobs;
+	const freeze = jobToShow(freezing);
+	useEnded(freezing, versions.reload);
 	const { jobs, problem, verify } = useVerify(versions.reload);
 	const [diff, setDiff] = useState(/** @type {{older: VersionJson, newer: VersionJson} | null} */ (null));
 	const [asked, setAsked] = useState(/** @type {VersionJson | 'freeze' | null} */ (null));
@@ -116,6 +121,7 @@ function VersionsOf({ one }) {
 			<button data-needs="lead" class="button button--primary" type="button" onClick=${() => setAsked('freeze')}>Freeze a version…</button>
 		</div>
 		${problem ? html`<p class="card form__error" role="alert">${problem}</p>` : null}
+		${freeze && freeze.state !== 'done' && asked !== 'freeze' ? html`<section class="card" aria-label="Freezing"><${JobProgress} job=${freeze} /></section>` : null}
 		${diff ? html`<${VersionDiff} ...${diff} dataset=${one.name} onClose=${() => setDiff(null)} />` : null}
 		${items.length === 0 ? html`
 			<section class="card empty"><h2>Nothing is frozen yet</h2><p>${count(one.accepted)} of ${plural(one.groups, 'group')} accepted so far. A version contains the accepted groups, or all groups that pass.</p></section>` : null}

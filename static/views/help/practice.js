@@ -9,9 +9,11 @@ import { count } from '../../lib/format.js';
 import { page } from '../../lib/router.js';
 import { useResource } from '../../lib/resource.js';
 import { isTeam } from '../../state/me.js';
+import { isOver, jobToShow } from '../../state/jobs.js';
 import { isJudged, making, makingFailed, startPractice } from '../../state/practice.js';
 import { JobProgress } from '../job_progress.js';
 import { MARKS, WORDS } from '../lesson_card.js';
+import { useEnded, useRunningJobs } from '../running_jobs.js';
 import { RecordingPracticePart } from './practice_recording.js';
 
 /** @import {LessonJson} from '../../api/practice.js' */
@@ -35,11 +37,15 @@ export function PracticePart({ onLeave }) {
 	const judged = lessons.filter(isJudged);
 	const next = lessons.find((lesson) => !isJudged(lesson));
 	const right = judged.filter(({ state }) => state === 'right').length;
-	const busy = making.value !== null;
+	const { jobs } = useRunningJobs({ kind: 'practice' }, ({ subject }) => subject?.practice === 'groups');
+	const job = making.value ?? jobToShow(jobs.filter((one) => !isOver(one)));
+	const busy = job !== null;
 	const at = page.value;
+	useEnded(jobs, reload);
 	useEffect(() => { if (!busy) reload(); }, [busy]);
 	/** @param {boolean} again */
 	async function begin(again) {
+		if (busy) return;
 		await startPractice(again);
 		// It went to the first group; the help stays only where it could not.
 		if (!makingFailed.value && page.value !== at) onLeave();
@@ -55,7 +61,7 @@ export function PracticePart({ onLeave }) {
 						${next ? html`<a class="button button--primary" href=${`/review/${next.group}`} onClick=${onLeave}>${judged.length ? 'Continue' : 'Begin'} with lesson ${next.number}</a>` : null}
 						<button class="button" type="button" data-needs="annotate" data-of="" aria-disabled=${busy} onClick=${() => begin(true)}>Start again</button>`}
 			</p>
-			${making.value ? html`<${JobProgress} job=${making.value} cancellable=${false} />` : null}
+			${job ? html`<${JobProgress} job=${job} cancellable=${false} />` : null}
 			${makingFailed.value ? html`<p class="form__error" role="alert">${makingFailed.value}</p>` : null}
 			${lessons.length ? html`
 				<table class="table">
