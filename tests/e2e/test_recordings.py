@@ -109,6 +109,7 @@ class TestAdding:
         row = page.get_by_role("row", name="cup final")
         expect(row).to_contain_text("640 × 360 · 25 frames a second")
         row.get_by_role("button", name="Remove").click()
+        row.get_by_role("button", name="Remove with its shots").click()
         expect(row).to_have_count(0)
         delete_dataset(server, "sent")
 
@@ -396,6 +397,31 @@ class TestInstants:
         rows = page.request.get("/api/v1/groups?dataset=cup").json()["items"]
         assert [row["key"] for row in rows] == [f"cup final/{n}.png" for n in (0, 40, 60)]
 
+    def test_frame_and_choice_outlive_a_reload_and_the_header_names_the_dataset(
+        self, recording: int, open_page: OpenPage
+    ) -> None:
+        page = opened(open_page, recording)
+        expect(page.get_by_role("banner")).to_contain_text("cup")
+        page.keyboard.press("i")
+        page.keyboard.press("ArrowDown")
+        shows(page, 40)
+        page.wait_for_url("**/recordings/*?frame=40")
+        page.reload()
+        shows(page, 40)
+        expect(page.get_by_role("region", name="Instants")).to_contain_text("1 frame chosen")
+
+    def test_keys_that_can_do_nothing_say_why(self, recording: int, open_page: OpenPage) -> None:
+        page = opened(open_page, recording)
+        for key, why in [("s", "begins with this frame"), ("Control+z", "nothing to undo")]:
+            page.keyboard.press(key)
+            expect(page.get_by_text(why)).to_be_visible()
+        page.keyboard.press("ArrowDown")
+        shows(page, 40)
+        page.keyboard.press("ArrowDown")
+        shows(page, 80)
+        page.keyboard.press("m")
+        expect(page.get_by_text("This is the last shot")).to_be_visible()
+
     def test_what_is_chosen_while_groups_are_made_stays_chosen(
         self, recording: int, open_page: OpenPage
     ) -> None:
@@ -459,6 +485,7 @@ class TestLinking:
         card.get_by_role("link", name="frames 0 to 39").click()
         side(page, "Live", 0)
         page.get_by_role("button", name="Remove this link").click()
+        page.get_by_role("button", name="Remove the link with its 0 instants").click()
         shows(page, 0)
         page.keyboard.press("ArrowDown")
         shows(page, 40)

@@ -38,6 +38,13 @@ async function opened() {
 }
 
 describe('a list of shots', () => {
+	it('says that there is nothing to undo', async () => {
+		const shots = await opened();
+		shots.undo();
+		assert.equal(notice.value?.text, 'There is nothing to undo.');
+		assert.equal(asked.length, 0);
+	});
+
 	it('keeps what was changed while it was read', async () => {
 		const shots = await opened();
 		shots.read();

@@ -16,7 +16,7 @@ import { FormError } from '../form_error.js';
 /** @import {Balls, Place} from './ball_state.js' */
 /** @import {Cameras} from './camera_state.js' */
 
-const ENDS = { lost: 'until it was lost', left: 'until it left the picture', limit: 'to the end of the shot, or 250 frames' };
+const ENDS = { lost: 'until it was lost', left: 'until it left the picture' };
 const WORDS = { followed: 'followed', uncertain: 'uncertain', confirmed: 'confirmed', lost: 'lost' };
 /** Frames of the way that is drawn to either side. */
 const WAY = 12;
@@ -90,10 +90,17 @@ export function BallBand({ runs, all = [], first, frames }) {
 	`;
 }
 
+/** Why a run goes no further. @param {'lost' | 'left' | 'limit'} why @param {boolean} isEdge whether it reaches the edge of its shot @param {string} edge */
+function endText(why, isEdge, edge) {
+	if (why !== 'limit') return ENDS[why];
+	return isEdge ? `to the ${edge} of the shot` : 'for 250 frames';
+}
+
 /** @param {{one: RecordingJson, shot: Shot | undefined, balls: Balls}} props */
 export function BallCard({ one, shot, balls }) {
 	const { run, runs, busy, error } = balls;
 	const ball = run && ballAt(run, wanted.value);
+	const clicked = run?.clicks.some(({ frame }) => frame === wanted.value);
 	const accepted = Boolean(run?.accepted_by);
 	const why = busy ? 'The ball is being followed' : run ? '' : 'No ball is followed in this frame';
 	const left = run ? run.uncertain - run.confirmed.length : 0;
@@ -113,8 +120,8 @@ export function BallCard({ one, shot, balls }) {
 		<section class="card ball" aria-label="Ball" aria-busy=${busy}>
 			<h2>Ball${run ? html`<span class="card__aside">frames ${run.first} to ${run.last}</span>` : null}</h2>
 			${run ? html`
-				<p>${accepted ? html`<strong>Accepted</strong> by ${run.accepted_by}: the ball was added to ${plural(run.placed ?? 0, 'view')}${run.kept ? `; ${plural(run.kept, 'view')} already had one and ${run.kept === 1 ? 'keeps' : 'keep'} it` : ''}. ` : null}Followed backwards ${ENDS[run.before]}, forwards ${ENDS[run.after]}. ${left ? `${plural(left, 'frame')} uncertain.` : 'No frame is uncertain.'}</p>
-				<p data-ball-state=${ball?.state ?? 'lost'}>${ball ? html`Frame ${wanted.value}: <strong>${WORDS[ball.state]}</strong>, ${ball.diameter.toFixed(1)} px wide, centre ± ${ball.sigma.toFixed(1)} px, ${Math.round(100 * ball.confidence)} % sure.` : html`Frame ${wanted.value}: <strong>lost</strong>. Click the ball where it is seen.`}</p>
+				<p>${accepted ? html`<strong>Accepted</strong> by ${run.accepted_by}: the ball was added to ${plural(run.placed ?? 0, 'view')}${run.kept ? `; ${plural(run.kept, 'view')} already had one and ${run.kept === 1 ? 'keeps' : 'keep'} it` : ''}. ` : null}Followed backwards ${endText(run.before, run.first === shot?.first, 'beginning')}, forwards ${endText(run.after, run.last === shot?.last, 'end')}. ${left ? `${plural(left, 'frame')} uncertain.` : 'No frame is uncertain.'}</p>
+				<p data-ball-state=${ball?.state ?? 'lost'}>${ball ? html`Frame ${wanted.value}: <strong>${WORDS[ball.state]}</strong>, ${ball.diameter.toFixed(1)} px wide, centre ± ${ball.sigma.toFixed(1)} px, ${clicked ? 'clicked here' : `${Math.round(100 * ball.confidence)} % sure`}.` : html`Frame ${wanted.value}: <strong>lost</strong>. Click the ball where it is seen.`}</p>
 				${run.stale ? html`<p class="form__error">The video file has changed since then.</p>` : null}`
 			: html`<p>${runs.length ? 'No ball is followed in this frame. ' : ''}Click the ball in the picture: it is followed forwards and backwards until it is lost.</p>`}
 			${shot && runs.length ? html`

@@ -8,13 +8,16 @@ import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/ho
 import { deleteLink, getLink, getLinkedFrames, getRecording, getShots, putInstants } from '../../api/recordings.js';
 import { ApiError } from '../../api/problem.js';
 import { useAttempt } from '../../lib/attempt.js';
+import { plural } from '../../lib/format.js';
 import { useKeys, useSize } from '../../lib/hooks.js';
 import { useResource } from '../../lib/resource.js';
 import { navigate, page } from '../../lib/router.js';
+import { useDataset } from '../../state/datasets.js';
 import { instantBeside, markOf, replayFrameAt, withInstant } from '../../state/links.js';
-import { announce, complain } from '../../state/notice.js';
+import { announce, complain, inform } from '../../state/notice.js';
 import { makePlayer } from '../../state/playback.js';
 import { clockOf, matchTime, timecode } from '../../state/shots.js';
+import { ConfirmButton } from '../evaluation/confirm_button.js';
 import { FormError } from '../form_error.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
 import { BallCard } from './link_ball.js';
@@ -70,7 +73,7 @@ function useLink(first) {
 			complain(`Another person changed this link. Load the page again to see the new state: ${problem.message}`);
 		}
 	}
-	return { link, change, reload, undo: () => change(() => before.current.pop() ?? null, 'Undone.', false) };
+	return { link, change, reload, undo: () => change(() => { const last = before.current.pop(); if (!last) inform('There is nothing to undo.'); return last ?? null; }, 'Undone.', false) };
 }
 
 /** @param {{side: Side, shot: LinkedShot, player: Player, one: RecordingJson, focused: boolean, focus: () => void, mark: string}} props */
@@ -194,7 +197,10 @@ function Both({ first, recordings }) {
 				</p>
 			<//>
 			<${InstantsList} link=${link} dataset=${dataset} show=${show} remove=${remove}>
-				<button class="button button--small linking__remove" type="button" data-needs="annotate" data-of=${dataset} title="Groups that were made with this link stay" onClick=${() => attempt(deleteLink(link.live.recording, link.id), () => navigate(`/recordings/${link.replay.recording}`))}>Remove this link</button>
+				<p class="linking__remove"><${ConfirmButton}
+					small=${true} needs="annotate" of=${dataset} label="Remove this link" question=${`Remove the link with its ${plural(link.instants.length, 'instant')}? Groups made with it stay.`} what=""
+					run=${() => attempt(deleteLink(link.live.recording, link.id), () => navigate(`/recordings/${link.replay.recording}`))}
+				/></p>
 				${error ? html`<${FormError} error=${error} />` : null}
 			<//>
 			<${BallCard} link=${link} dataset=${dataset} reload=${reload} />
@@ -213,6 +219,7 @@ export function LinkPage() {
 	const one = found.value?.first.id === link ? found.value : null;
 	const why = one && (one.recordings.live.problem ?? one.recordings.replay.problem);
 	const back = one?.first.replay;
+	useEffect(() => { if (one) useDataset(one.recordings.live.dataset); }, [one]);
 	return html`
 		<${PageFrame} current="recordings" title="Link a replay" where=${html`<a href="/recordings">Recordings</a>${back ? html` / <a href=${`/recordings/${back.recording}`}>${back.name}</a> / <strong>replay ${back.first} to ${back.last}</strong>` : null}`}>
 			${found.error ? html`<${Trouble} title="This link cannot be shown" error=${found.error} retry=${found.reload} />` : null}

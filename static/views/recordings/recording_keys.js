@@ -1,6 +1,7 @@
 // @ts-check
 /** Keys of the page of a recording. */
 
+import { inform } from '../../state/notice.js';
 import { goTo, run, stand, stepBy, toggleRunning, wanted } from '../../state/playback.js';
 import { changedAt, mergedWithNext, SHOT_KINDS, shotAt, splitAt } from '../../state/shots.js';
 
@@ -25,6 +26,8 @@ export function keysOfRecording(one, shots, doing) {
 	};
 	/** @param {Partial<Shot>} change @param {string} told */
 	const set = (change, told) => doing.current.change(changedAt(shots(), at(), change), told);
+	/** @param {Shot[] | null} items @param {string} told @param {string} why nothing can be done here */
+	const change = (items, told, why) => { if (items) doing.current.change(items, told); else inform(why); };
 	const second = Math.round(one.fps ?? 25);
 	const [look, edit] = ['Recording', 'Shots'];
 	return [
@@ -38,8 +41,8 @@ export function keysOfRecording(one, shots, doing) {
 		{ keys: ['Shift+ArrowLeft'], label: 'One second back', group: look, run: () => { stepBy(-second); } },
 		{ keys: ['ArrowDown'], label: 'Next shot', group: look, run: () => shotBy(1) },
 		{ keys: ['ArrowUp'], label: 'Previous shot', group: look, run: () => shotBy(-1) },
-		{ keys: ['s'], label: 'Split the shot at this frame', group: edit, needs: 'annotate', run: () => doing.current.change(splitAt(shots(), wanted.value), 'Split.') },
-		{ keys: ['m'], label: 'Merge the shot with the next', group: edit, needs: 'annotate', run: () => doing.current.change(mergedWithNext(shots(), at()), 'Merged with the next shot.') },
+		{ keys: ['s'], label: 'Split the shot at this frame', group: edit, needs: 'annotate', run: () => change(splitAt(shots(), wanted.value), 'Split.', 'The shot begins with this frame. Go to a later frame of the shot to split it.') },
+		{ keys: ['m'], label: 'Merge the shot with the next', group: edit, needs: 'annotate', run: () => change(mergedWithNext(shots(), at()), 'Merged with the next shot.', 'This is the last shot: there is no next one to merge it with.') },
 		...SHOT_KINDS.map(({ kind, label }, index) => /** @type {Binding} */ ({
 			keys: [String(index + 1)], label: `Set the kind of the shot: ${label}`, group: edit, needs: 'annotate', run: () => set({ kind }, `The kind of this shot is now ${label}.`),
 		})),

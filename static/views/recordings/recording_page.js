@@ -2,12 +2,14 @@
 /** One recording: its frames, its shots as a strip, and the instants that become groups. */
 
 import { html } from 'htm/preact';
-import { useEffect, useLayoutEffect, useMemo, useRef, useState } from 'preact/hooks';
+import { useEffect, useLayoutEffect, useMemo, useRef } from 'preact/hooks';
 
 import { getLinks, getRecording } from '../../api/recordings.js';
 import { useKeys, useSize } from '../../lib/hooks.js';
-import { page, param } from '../../lib/router.js';
+import { address, navigate, page, param, place } from '../../lib/router.js';
 import { useResource } from '../../lib/resource.js';
+import { stored } from '../../lib/storage.js';
+import { useDataset } from '../../state/datasets.js';
 import { announce } from '../../state/notice.js';
 import { goTo, openFilm, playTrouble, seen, showAt, speed, toggleRunning, wanted } from '../../state/playback.js';
 import { makeShotList } from '../../state/shot_list.js';
@@ -32,22 +34,49 @@ import { factsOf } from './recordings_page.js';
 /** @import {Cameras} from './camera_state.js' */
 /** @import {RunningJobs} from '../running_jobs.js' */
 
-/** Which frames are chosen to become groups. */
-function useInstants() {
-	const [chosen, setChosen] = useState(/** @type {ReadonlySet<number>} */ (new Set()));
+/** How long a frame is at hand before the address says so, milliseconds: browsers refuse an address that changes with every frame. */
+const SETTLED = 300;
+/** Frames that are chosen to become groups, by the id of their recording. */
+const instants = stored('instants', /** @type {Record<string, number[]>} */ ({}), 'sessionStorage');
+
+/** Which frames of a recording are chosen to become groups. @param {number} recording */
+function useInstants(recording) {
+	const frames = instants.value[recording];
+	const chosen = useMemo(() => /** @type {ReadonlySet<number>} */ (new Set(frames)), [frames]);
+	/** @param {number[]} next */
+	const keep = (next) => {
+		const { [recording]: _, ...rest } = instants.value;
+		instants.value = next.length ? { ...rest, [recording]: next } : rest;
+	};
+	const present = () => new Set(instants.value[recording]);
 	return {
 		chosen,
 		/** @param {number} frame */
-		turn: (frame) => setChosen((before) => {
-			const next = new Set(before);
+		turn: (frame) => {
+			const next = present();
 			if (!next.delete(frame)) next.add(frame);
 			announce(next.has(frame) ? `Frame ${frame} is chosen.` : `Frame ${frame} is no longer chosen.`);
-			return next;
-		}),
-		/** @param {number[]} frames */
-		add: (frames) => setChosen((before) => new Set([...before, ...frames])),
-		clear: () => setChosen(new Set()),
+			keep([...next]);
+		},
+		/** @param {number[]} more */
+		add: (more) => keep([...new Set([...present(), ...more])]),
+		clear: () => keep([]),
 	};
+}
+
+/** Write the frame into the address while nothing plays, so that a reload and Back find it. @param {number} recording */
+function useFrameInAddress(recording) {
+	const [at, plays] = [wanted.value, speed.value !== 0];
+	useLayoutEffect(() => {
+		if (plays) return undefined;
+		const timer = setTimeout(() => {
+			const shown = page.peek();
+			// The next page may be asked for and not yet drawn.
+			if (shown.page !== 'recording' || shown.recording !== recording || param('frame') === String(at)) return;
+			navigate(address(place.peek().path, { ...Object.fromEntries(place.peek().search), frame: String(at) }), { replace: true });
+		}, SETTLED);
+		return () => clearTimeout(timer);
+	}, [at, plays]);
 }
 
 /** @param {{one: RecordingJson, seconds: (frame: number) => number, cameras: Cameras, balls: Balls}} props */
@@ -76,7 +105,8 @@ function Film({ one, running, reload }) {
 	const { read, change, undo, remember } = shots;
 	const [list, error] = [shots.list.value, shots.error.value];
 	useEffect(() => { read(); }, [read]);
-	const instants = useInstants();
+	const chosen = useInstants(one.id);
+	useFrameInAddress(one.id);
 	const links = useResource((signal) => getLinks(one.id, signal), [one.id]).value?.items ?? [];
 	useEffect(() => {
 		const end = openFilm({ id: one.id, sha256: one.sha256, frames: one.frames ?? 0, fps: one.fps ?? 25 });
@@ -86,8 +116,8 @@ function Film({ one, running, reload }) {
 	}, [one.id, one.sha256, one.frames]);
 	useEnded(running.jobs, read);
 	useEnded(running.jobs.filter(({ kind }) => kind === 'instants'), reload);
-	const doing = useRef({ change, undo, turn: instants.turn });
-	doing.current = { change, undo, turn: instants.turn };
+	const doing = useRef({ change, undo, turn: chosen.turn });
+	doing.current = { change, undo, turn: chosen.turn };
 	const keys = useMemo(() => keysOfRecording(one, () => shots.list.value?.items ?? [], doing), [one.id]);
 	useKeys(keys);
 	const shot = list?.items[shotAt(list.items, wanted.value)];
@@ -111,10 +141,10 @@ function Film({ one, running, reload }) {
 				<${BallCard} one=${one} shot=${shot} balls=${balls} />
 				<${CameraCard} one=${one} cameras=${cameras} />
 				<${LinkCard} one=${one} shots=${list.items} shot=${shot} links=${links} />
-				<${InstantsCard} one=${one} running=${running} shot=${shot} instants=${instants} links=${links} />
+				<${InstantsCard} one=${one} running=${running} shot=${shot} instants=${chosen} links=${links} />
 				<${ClockCard} one=${one} reload=${reload} />
 			</div>
-			<${Strip} one=${one} shots=${list.items} at=${at} chosen=${instants.chosen} balls=${balls} goTo=${goTo} />
+			<${Strip} one=${one} shots=${list.items} at=${at} chosen=${chosen.chosen} balls=${balls} goTo=${goTo} />
 			<${CameraCurves} cameras=${cameras} />
 		</div>
 	`;
@@ -133,6 +163,7 @@ export function RecordingPage() {
 	const found = useResource((signal) => getRecording(id, signal), [id]);
 	// The answer of the recording before stays until this one's is there.
 	const one = found.value?.id === id ? found.value : null;
+	useEffect(() => { if (one) useDataset(one.dataset); }, [one?.dataset]);
 	return html`
 		<${PageFrame}
 			current="recordings" title=${one ? one.name : 'Recording'}
