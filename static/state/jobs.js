@@ -1,9 +1,12 @@
 // @ts-check
 /** Jobs as they stand: told by the server, asked for where it cannot tell. */
 
+import { signal as signalOf } from '@preact/signals';
+
 import { connected, listen } from '../api/events.js';
-import { getJob } from '../api/jobs.js';
+import { getJob, getJobs } from '../api/jobs.js';
 import { ApiError } from '../api/problem.js';
+import { plural } from '../lib/format.js';
 
 /** @import {JobJson} from '../api/jobs.js' */
 
@@ -28,6 +31,40 @@ export function shareOf(job) {
  */
 export function jobToShow(jobs) {
 	return jobs.find(({ state }) => state === 'running') ?? jobs.find((job) => !isOver(job)) ?? jobs.at(-1) ?? null;
+}
+
+/** Jobs that wait or run, as far as the person may see them; known while a job that waits is shown. */
+export const openJobs = signalOf(/** @type {JobJson[]} */ ([]));
+/** Those who show a job that waits, and what ends listening for them. */
+let [showing, deafen] = [0, () => {}];
+
+/** Keep `openJobs` up to date until the returned function is called. */
+export function followOpenJobs() {
+	const read = () => getJobs({ state: 'open', limit: 500 }).then(
+		({ items }) => { openJobs.value = items; },
+		// It says less while the server cannot be asked.
+		(error) => { if (!(error instanceof ApiError)) throw error; },
+	);
+	if (!showing) {
+		read();
+		deafen = listen('job', (/** @type {JobJson} */ told) => {
+			openJobs.value = [...openJobs.value.filter(({ id }) => id !== told.id), ...(isOver(told) ? [] : [told])];
+		}, read);
+	}
+	showing += 1;
+	return () => {
+		showing -= 1;
+		if (!showing) deafen();
+	};
+}
+
+/** What a job waits for, in words. @param {JobJson} job @param {JobJson[]} open jobs that wait or run */
+export function waitingText(job, open) {
+	const before = open.filter(({ id }) => id < job.id);
+	const running = before.filter(({ state }) => state === 'running');
+	// Jobs of one dataset run one after the other.
+	const first = running.find(({ dataset }) => dataset !== null && dataset === job.dataset) ?? running[0];
+	return first ? `Waiting for: ${first.title} (${plural(before.length, 'job')} before it)` : 'Waiting.';
 }
 
 /**

@@ -127,7 +127,6 @@ function Outcome({ job, dry, dataset }) {
 	return html`
 		<section class="card form" aria-label="Progress" data-tone=${isOver(job) ? toneOf(job) : undefined}>
 			<${JobProgress} job=${job} />
-			${job.problem?.hint ? html`<p>${job.problem.hint}</p>` : null}
 			${isOver(job) && job.result ? html`<${ImportReport} report=${job.result} dry=${dry} dataset=${dataset} />` : null}
 			${done && !dry ? html`<p class="buttons"><a class="button button--primary" href=${pageAddress(dataset, 'queue')}>Open the queue</a><a class="button" href=${pageAddress(dataset, 'yield')}>Open the yield page</a></p>` : null}
 		</section>

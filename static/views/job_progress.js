@@ -2,11 +2,12 @@
 /** How far a job is, in one line, with the way to end it. */
 
 import { html } from 'htm/preact';
+import { useEffect } from 'preact/hooks';
 
 import { cancelJob } from '../api/jobs.js';
 import { useAttempt } from '../lib/attempt.js';
 import { capital, count } from '../lib/format.js';
-import { isOver, shareOf } from '../state/jobs.js';
+import { followOpenJobs, isOver, openJobs, shareOf, waitingText } from '../state/jobs.js';
 import { FormError } from './form_error.js';
 
 /** @import {JobJson} from '../api/jobs.js' */
@@ -15,7 +16,7 @@ import { FormError } from './form_error.js';
 function jobText(job) {
 	if (job.state === 'failed') return capital(job.problem?.detail ?? 'It failed.');
 	if (job.sentence) return job.sentence;
-	if (job.state === 'waiting') return 'Waiting.';
+	if (job.state === 'waiting') return waitingText(job, openJobs.value);
 	return job.total ? `${count(job.done)} of ${count(job.total)}` : '';
 }
 
@@ -42,6 +43,8 @@ function Meter({ job }) {
 /** @param {{job: JobJson, cancellable?: boolean}} props */
 export function JobProgress({ job, cancellable = true }) {
 	const { error, attempt } = useAttempt();
+	const waits = job.state === 'waiting';
+	useEffect(() => (waits ? followOpenJobs() : undefined), [waits]);
 	const cancel = () => attempt(cancelJob(job.id));
 	return html`
 		<div class="job" role="status">
@@ -52,6 +55,7 @@ export function JobProgress({ job, cancellable = true }) {
 				${cancellable && !isOver(job) ? html`<button class="button button--small" type="button" data-needs="lead" data-of=${job.dataset ?? ''} onClick=${cancel}>Cancel<span class="hidden-text"> ${job.title}</span></button>` : null}
 			</div>
 			${isOver(job) ? null : html`<${Meter} job=${job} />`}
+			${job.state === 'failed' && job.problem?.hint ? html`<p>${job.problem.hint}</p>` : null}
 			${error ? html`<${FormError} error=${error} />` : null}
 		</div>
 	`;

@@ -89,7 +89,6 @@ function JobCard({ job }) {
 				<${JobProgress} job=${job} />
 				<p class="note">${job.kind}${job.dataset ? html` · <a class="link" href=${pageAddress(job.dataset, 'queue')}>${job.dataset}</a>` : null}${` · ${job.actor} · ${job.started ? 'started' : 'requested'} `}<${When} at=${job.started ?? job.created} />${job.ended ? html`${' · ended '}<${When} at=${job.ended} />` : null}</p>
 				${partOf(job)}
-				${job.problem?.hint ? html`<p>${job.problem.hint}</p>` : null}
 			</section>
 		</li>
 	`;

@@ -69,5 +69,5 @@ class TestHowFar:
             expect(share).to_be_empty()
             assert share.get_attribute("aria-valuenow") is None
         expect(cards[1]).to_contain_text("started")
-        expect(cards[2]).to_contain_text("Waiting.")
+        expect(cards[2]).to_contain_text("Waiting for: Solve sample (2 jobs before it)")
         expect(cards[2]).to_contain_text("requested")

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { describe, it } from 'node:test';
 
 import { ApiError } from '../../static/api/problem.js';
-import { follow, jobToShow } from '../../static/state/jobs.js';
+import { follow, jobToShow, waitingText } from '../../static/state/jobs.js';
 
 // A page that nobody looks at is told nothing: it asks.
 globalThis.document = /** @type {any} */ ({ hidden: true, addEventListener() {}, removeEventListener() {} });
@@ -23,6 +23,20 @@ describe('jobToShow', () => {
 	});
 	it('shows nothing where there is none', () => {
 		assert.equal(jobToShow([]), null);
+	});
+});
+
+describe('waitingText', () => {
+	const [index, solve, other] = [
+		{ ...job(3, 'running'), title: 'Index clip_0', dataset: 'a' }, { ...job(4, 'running'), title: 'Solve b', dataset: 'b' }, { ...job(5, 'waiting'), title: 'Export a', dataset: 'a' },
+	];
+	it('names the job that runs before, of the same dataset where there is one', () => {
+		assert.equal(waitingText({ ...job(6, 'waiting'), dataset: 'b' }, [index, solve, other]), 'Waiting for: Solve b (3 jobs before it)');
+		assert.equal(waitingText({ ...job(6, 'waiting'), dataset: null }, [index]), 'Waiting for: Index clip_0 (1 job before it)');
+	});
+	it('names none that begins later, or that the person may not see', () => {
+		assert.equal(waitingText({ ...job(2, 'waiting'), dataset: 'a' }, [index, solve]), 'Waiting.');
+		assert.equal(waitingText({ ...job(6, 'waiting'), dataset: 'a' }, []), 'Waiting.');
 	});
 });
 

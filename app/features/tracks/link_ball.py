@@ -248,11 +248,16 @@ def _collect_ball_rays(
             rays.append((time, pixel, camera))
             last = time
     if not rays:
-        where = "in its groups" if upload is None else "in the file"
+        where = "in their groups" if upload is None else "in the file"
+        frames = f"frames {shot.first} to {shot.last} of {shot.name}"
+        if not inside:
+            raise InputError(
+                f"{frames} have no ball {where}",
+                hint="Mark the ball in frames of the shot that have a camera, or send a ball.csv.",
+            )
         raise InputError(
-            f"frames {shot.first} to {shot.last} of {shot.name} have "
-            f"{plural(len(inside), 'ball')} {where}, but none in a frame that has a camera",
-            hint="Track the camera of the shot, and mark the ball in frames of it or send a ball.csv.",
+            f"{frames} have {plural(len(inside), 'ball')} {where}, but no camera in any of those frames",
+            hint="Track the camera of the shot, or mark the ball in frames that have a camera.",
         )
     left_out = len(seen) - sum(number in seen for number in inside)
     rays_found = build_ball_rays(*(list(column) for column in zip(*rays, strict=True)))

@@ -158,6 +158,14 @@ class TestLinkByBall:
         assert "hardly moves" in after["map"]["ball_reason"]
         assert len(after["instants"]) == 2
 
+    def test_without_a_ball_it_does_not_speak_of_cameras(
+        self, api: Any, link: str, finished: Finished
+    ) -> None:
+        job = finished(api.post(f"{link}/ball", json={}))
+        assert job.state == "failed"
+        assert "have no ball in their groups" in job.problem["detail"]
+        assert "Mark the ball" in job.problem["hint"]
+
     def test_without_cameras_it_says_what_to_do(
         self, api: Any, link: str, finished: Finished
     ) -> None:
@@ -165,7 +173,7 @@ class TestLinkByBall:
         job = finished(api.post(f"{link}/ball", json=sent))
         assert job.state == "failed"
         assert (
-            "150 balls in the file, but none in a frame that has a camera" in job.problem["detail"]
+            "150 balls in the file, but no camera in any of those frames" in job.problem["detail"]
         )
         assert "Track the camera of the shot" in job.problem["hint"]
         assert api.post(f"{link}/ball", json={"live_upload": "0" * 32}).status_code == 404
