@@ -26,7 +26,7 @@ const FETCH_AHEAD_AFTER = 1500;
 const GLOBAL_KEYS = [
 	{ keys: ['?', 'Shift+?'], label: 'Help: keys, legend, glossary, guide, practice', group: 'Everywhere', shown: '?', run: openHelp },
 	{ keys: ['Ctrl+k'], label: 'Go to a page, dataset, group or action', group: 'Everywhere', typing: true, run: openPalette },
-	{ keys: ['Shift+b'], label: 'Notifications', group: 'Everywhere', when: () => isTeam, run: openNotifications },
+	...(isTeam ? [{ keys: ['Shift+b'], label: 'Notifications', group: 'Everywhere', run: openNotifications }] : []),
 	// Pages with a search field of their own bind it to that.
 	{ keys: ['/'], label: 'Search', group: 'Everywhere', run: openPalette },
 ];

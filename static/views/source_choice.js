@@ -164,14 +164,18 @@ function FolderList({ chosen, choose, guess }) {
 	const items = folders.value?.items ?? [];
 	const guessed = folders.value?.path === path ? folders.value.format : null;
 	useEffect(() => { if (guessed) guess(guessed); }, [guessed]);
-	/** @param {FolderEntry} entry */
-	function enter(entry) {
+	/** @param {MouseEvent} event @param {FolderEntry} entry */
+	function enter(event, entry) {
+		// The second click of a double click is meant for the same entry, and may meet one of the next list.
+		if (event.detail > 1) return;
 		choose(entry.path);
 		if (!entry.folder) return;
 		setTrail([...trail, path]);
 		setPath(entry.path);
 	}
-	function back() {
+	/** @param {MouseEvent} event */
+	function back(event) {
+		if (event.detail > 1) return;
 		setPath(trail[trail.length - 1]);
 		setTrail(trail.slice(0, -1));
 	}
@@ -183,7 +187,7 @@ function FolderList({ chosen, choose, guess }) {
 				${trail.length ? html`<li><button class="folders__entry" type="button" onClick=${back}>↑ back</button></li>` : null}
 				${items.map((entry) => html`
 					<li key=${entry.path}>
-						<button class="folders__entry" type="button" aria-pressed=${entry.path === chosen} onClick=${() => enter(entry)}>${entry.name}${entry.folder ? '/' : ''}</button>
+						<button class="folders__entry" type="button" aria-pressed=${entry.path === chosen} onClick=${(/** @type {MouseEvent} */ event) => enter(event, entry)}>${entry.name}${entry.folder ? '/' : ''}</button>
 					</li>`)}
 			</ul>
 			${folders.value?.more ? html`<small>The folder contains more entries than are listed here.</small>` : null}

@@ -4,6 +4,7 @@
 import { html } from 'htm/preact';
 import { useLayoutEffect, useRef, useState } from 'preact/hooks';
 
+import { page } from '../../lib/router.js';
 import {
 	activeBindings, chooseKey, chordOf, chosenKeys, idOf, isEditable, keysOf, lettersOn, written,
 } from '../../lib/keys.js';
@@ -12,6 +13,7 @@ import {
 
 /** Headings in the order of the work; others follow as they come. */
 const ORDER = ['Verdict', 'Navigate', 'View', 'Edit'];
+const REVIEWING = ' The wheel zooms about the pointer, dragging the picture pans, a double click shows one view alone. Drag a line point or the ball to move it; select the ball to resize its box by the corners. Corner brackets with a score are predictions: they are not used until you accept them.';
 const MODIFIERS = new Set(['Shift', 'Control', 'Alt', 'Meta']);
 
 /** @param {Binding} binding @returns {string[]} */
@@ -91,6 +93,6 @@ export function Keys({ bindings }) {
 					<dl>${members.map((binding) => html`<${KeyRow} key=${idOf(binding)} binding=${binding} chosen=${chosen} onChoose=${setChosen} />`)}</dl>
 				</section>`)}
 		</div>
-		<p class="help__note">Click a key to choose another. The wheel zooms about the pointer, dragging the picture pans, a double click shows one view alone. Drag a line point or the ball to move it; select the ball to resize its box by the corners. Corner brackets with a score are predictions: they are not used until you accept them.</p>
+		<p class="help__note">Click a key to choose another.${bindings || page.value.page === 'review' ? REVIEWING : ''}</p>
 	`;
 }
