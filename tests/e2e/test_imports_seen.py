@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from urllib.parse import parse_qs, urlparse
 from zipfile import ZipFile
 
 import pytest
@@ -275,6 +276,27 @@ class TestGroupsWithoutAPicture:
             return said["state"], said["note"]
 
         until(page, lambda: verdict() == ("accepted", "seen in the video"))
+
+
+class TestFolders:
+    def test_a_double_click_enters_a_folder_once(self, open_page: OpenPage) -> None:
+        page = open_page("/import")
+        page.route(
+            "**/api/v1/imports/folders*",
+            lambda route: route.fulfill(
+                json={
+                    "path": parse_qs(urlparse(route.request.url).query).get("path", [""])[0],
+                    "items": [{"name": "matches", "path": "matches", "folder": True}],
+                    "format": None,
+                    "more": False,
+                }
+            ),
+        )
+        page.get_by_label("A folder on the server").check()
+        folders = page.get_by_role("list", name="Folders")
+        folders.get_by_role("button", name="matches/").dblclick()
+        folders.get_by_role("button", name="↑ back").click()
+        expect(folders.get_by_role("button", name="↑ back")).to_have_count(0)
 
 
 class TestGivenCameras:

@@ -44,6 +44,25 @@ class TestNews:
         expect(card.locator(".meter")).to_have_count(0)
 
 
+class TestTakenUp:
+    def test_an_estimate_that_was_begun_before_a_reload_is_followed(
+        self, open_page: OpenPage
+    ) -> None:
+        page = open_page(None)
+        job = {**RUNNING, "kind": "pictures", "title": "Estimate the pictures"}
+
+        def answer(route: Route) -> None:
+            asked = route.request.url
+            found = [job] if "kind=pictures" in asked and "state=open" in asked else []
+            route.fulfill(json={"items": found, "next": None})
+
+        page.route("**/api/v1/jobs?*", answer)
+        page.route("**/api/v1/jobs/4711", lambda route: route.fulfill(json=job))
+        page.goto("/datasets/sample/statistics")
+        card = page.get_by_role("region", name="Stretched and cropped pictures")
+        expect(card).to_contain_text("3 of 9 groups solved")
+
+
 class TestHowFar:
     def test_nothing_looks_done_of_a_job_that_waits_or_cannot_say_how_far_it_is(
         self, open_page: OpenPage

@@ -401,7 +401,7 @@ class TestInstants:
         self, recording: int, open_page: OpenPage
     ) -> None:
         page = opened(open_page, recording)
-        expect(page.get_by_role("banner")).to_contain_text("cup")
+        expect(page.locator(".header__dataset-name")).to_have_text("cup")
         page.keyboard.press("i")
         page.keyboard.press("ArrowDown")
         shows(page, 40)
