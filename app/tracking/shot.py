@@ -391,7 +391,11 @@ def _stand_on_one_tripod(
     if shown is None:
         return False
     # A few frames beside many hardly move the tripod: they are judged by themselves.
-    errors = [shown.error_px(each, shown.fit_camera(each)[0]) for each in painted[len(before) :]]
+    errors = []
+    for each in painted[len(before) :]:
+        # From metres away one fit does not get there.
+        near = replace(each, parameters=shown.fit_camera(each)[0])
+        errors.append(shown.error_px(near, shown.fit_camera(near)[0]))
     alone = [snapped.error_px for snapped in behind]
     return not do_cameras_travel(np.array(errors), np.array(alone), size)
 
