@@ -66,7 +66,7 @@ class TestIncludeView:
             ("bored", None, '"bored" is not a reason'),
             ("other", " ", "needs a note"),
             (None, "a note", "needs a reason"),
-            ("other", "x" * 2001, "at most 2,000"),
+            ("other", "x" * 2001, "the limit is 2,000"),
         ],
     )
     def test_an_unknown_reason_is_refused(self, make_group, reason, note, sentence) -> None:

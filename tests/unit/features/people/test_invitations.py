@@ -107,7 +107,7 @@ class TestInviteMany:
     @pytest.mark.parametrize("count", [0, 501])
     def test_lists_have_an_end(self, store: Store, count: int) -> None:
         rows = [InvitationRow(n, f"p{n}", "viewer") for n in range(count)]
-        with pytest.raises(InputError, match="1 to 500 people"):
+        with pytest.raises(InputError, match="it must have 1 to 500"):
             invite_many(store, rows, LinkMailer(None, None, URL), actor="local", dry_run=False)
 
 
