@@ -112,7 +112,9 @@ MEASURES = (
     Measure(
         "error", "Reprojection error", "% of the diagonal", "error_percent", ERROR_PERCENT, log=True
     ),
-    Measure("jac", "Lowest JaC of the views", "", "jac", make_even_bins(0, 1, 20), open_high=False),
+    Measure(
+        "jac", "Lowest JaC of views in use", "", "jac", make_even_bins(0, 1, 20), open_high=False
+    ),
     Measure(
         "agreement",
         "Lowest agreement with the paint",
