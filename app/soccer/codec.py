@@ -8,7 +8,7 @@ kept must stay readable. Floats come back the same bits.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, fields
 from typing import Any
 
 import msgspec
@@ -405,13 +405,11 @@ def hash_solver_inputs(
     positions: Mapping[str, SharedPosition],
     paint: Mapping[str, str],
     noise: Mapping[str, float],
-    match: str,
 ) -> str:
     """Digest of what solving a group reads, from (view digest, station digest) in order of views.
 
     Made of digests, so that a station shared by a thousand groups costs a thousand short sums.
-    A group without shared positions, paint and noise keeps the digest that it always had, but for
-    one of a single view that a match is named for: what its camera knows of the pitch depends on it.
+    A group without shared positions, paint and noise keeps the digest that it always had.
 
     Args:
         pitch: The pitch.
@@ -419,18 +417,14 @@ def hash_solver_inputs(
         positions: What the match shares, by view.
         paint: Digest of what was read of the picture's paint, by view.
         noise: Of balls, where it is another than the dataset's, by view.
-        match: Of the group; empty: none.
     """
-    pairs: list[Json] = [list(pair) for pair in views]
-    parts: list[Json] = [float(pitch.length), float(pitch.width), pairs]
+    parts: list[Json] = [float(pitch.length), float(pitch.width), [list(pair) for pair in views]]
     if positions or paint:
         parts.append(positions_to_json(positions))
     if paint:
         parts.append(dict(paint))
     if noise:
         parts.append({"noise": dict(noise)})
-    if match and len(pairs) == 1:
-        parts.append({"match": True})
     return digest_json(parts)
 
 
@@ -449,20 +443,8 @@ def hash_group_inputs(
     pairs = views or ((view_digest(view), station_digest(view.station)) for view in group.views)
     read = paint_digests_to_json(group.paint) if paint is None else paint
     return hash_solver_inputs(
-        group.pitch, pairs, group.positions, read, group.noise_factors_by_view, group.match
+        group.pitch, pairs, group.positions, read, group.noise_factors_by_view
     )
-
-
-def is_hash_of_group_inputs(digest: str, group: Group, paint: Mapping[str, str]) -> bool:
-    """Whether a digest is ``hash_group_inputs`` of a group, now or before its match counted there.
-
-    Args:
-        digest: As it is stored.
-        group: The group.
-        paint: As in ``hash_group_inputs``.
-    """
-    nameless = replace(group, match="")
-    return digest in (hash_group_inputs(group, paint), hash_group_inputs(nameless, paint))
 
 
 def hash_imported_group(group: Group) -> str:

@@ -115,7 +115,6 @@ def make_next_revision(stored: StoredGroup, group: Group, at: str) -> StoredGrou
             group.positions,
             codec.paint_digests_to_json(group.paint),
             group.noise_factors_by_view,
-            group.match,
         ),
         group=group,
         stations=stations,
@@ -173,7 +172,9 @@ def save_reimported_group(
     """Write the next revision of a group whose dataset has changed: head, views, own stations.
 
     Shared stations are left alone; ``save_station`` writes those. Views that are gone are
-    deleted, new ones inserted.
+    deleted, new ones inserted. Solutions go where a match is named, or no longer, for a single view:
+    what its camera knows of the pitch depends on it (``solving.calibrate.is_lone_frame``), and the
+    digest of inputs does not tell.
 
     Args:
         session: A write session.
@@ -197,6 +198,8 @@ def save_reimported_group(
     if digest is not None:
         values["source_hash"] = digest
     session.execute(update(GroupModel).where(GroupModel.id == stored.id).values(values))
+    if len(group.views) == 1 and bool(group.match) != bool(stored.group.match):
+        session.execute(delete(SolutionModel).where(SolutionModel.group_id == stored.id))
 
 
 def has_same_station(stored: StoredGroup, view: View) -> bool:
@@ -242,7 +245,6 @@ def refresh_inputs_hashes(session: Session, group_ids: Sequence[int]) -> None:
     statement = (
         select(
             GroupModel.id,
-            GroupModel.match,
             GroupModel.pitch_length,
             GroupModel.pitch_width,
             GroupModel.positions,
@@ -270,8 +272,7 @@ def refresh_inputs_hashes(session: Session, group_ids: Sequence[int]) -> None:
         positions = camera_positions_from_text(row.positions)
         pitch = Pitch(row.pitch_length, row.pitch_width)
         paint = read_paint_digests(row.paint)
-        own = noise.get(key, {})
-        digest = hash_solver_inputs(pitch, pairs[key], positions, paint, own, row.match)
+        digest = hash_solver_inputs(pitch, pairs[key], positions, paint, noise.get(key, {}))
         rows.append({"of": key, "inputs_hash": digest})
     if rows:
         session.execute(update(GroupModel).where(GroupModel.id == bindparam("of")), rows)

@@ -59,12 +59,7 @@ from app.features.solutions.service import list_stale_groups
 from app.features.what_if.service import examine_yield_cache
 from app.mail import read_mail_server
 from app.object_store.store import ChangedObjectError, ObjectStore, open_store
-from app.soccer.codec import (
-    is_hash_of_group_inputs,
-    paint_digests_to_json,
-    station_digest,
-    view_digest,
-)
+from app.soccer.codec import hash_group_inputs, paint_digests_to_json, station_digest, view_digest
 from app.wording import plural
 
 
@@ -194,10 +189,9 @@ def _check_digests(session: Session) -> CheckResult:
     for group in iterate_groups(session):
         count += 1
         views = {view.key: view_digest(view) for view in group.group.views}
-        paint = paint_digests_to_json(group.group.paint)
-        hashed = is_hash_of_group_inputs(group.inputs_hash, group.group, paint)
+        hashed = hash_group_inputs(group.group, paint_digests_to_json(group.group.paint))
         present = {key: digest for key, (digest, _) in group.view_digests.items()}
-        if present != views or not hashed:
+        if (present, group.inputs_hash) != (views, hashed):
             apart.append(f"group {group.id}")
     whole = f"of {count:,} groups and cameras, each matching its annotations"
     return summarize_faulty_records(

@@ -45,7 +45,7 @@ from app.features.versions.queries import (
     list_all_versions,
 )
 from app.features.versions.service import collect_calibration_keys, hash_version
-from app.soccer.codec import is_hash_of_group_inputs, paint_digests_to_json, policy_from_json
+from app.soccer.codec import hash_group_inputs, paint_digests_to_json, policy_from_json
 from app.soccer.group import Group
 from app.soccer.policy import Policy
 from app.soccer.solution import Solution
@@ -258,9 +258,8 @@ def _read_undamaged_groups(session: Session, ids: Sequence[int]) -> dict[int, Gr
     return {
         key: item.group
         for key, item in found.items()
-        if is_hash_of_group_inputs(
-            item.inputs_hash, item.group, paint_digests_to_json(item.group.paint)
-        )
+        if item.inputs_hash
+        == hash_group_inputs(item.group, paint_digests_to_json(item.group.paint))
     }
 
 

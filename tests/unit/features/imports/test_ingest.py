@@ -11,7 +11,6 @@ from app.errors import ConflictError, NotFoundError
 from app.features.datasets.service import get_dataset, list_datasets
 from app.features.groups.edit import SetLines, SetStationLines, SetViewInclusion, make_set_ball_edit
 from app.features.groups.history import read_history
-from app.features.groups.revision_queries import refresh_inputs_hashes
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.groups.undo import undo_group_edit
@@ -24,6 +23,7 @@ from app.features.imports.ingest import (
     read_unassigned_frames,
 )
 from app.features.stations.service import load_station, submit_station_edit
+from app.features.verdicts.service import set_verdict
 from app.formats.report import ReaderReport
 from app.soccer.annotation import BallAnnotation, Extras, make_lines
 from app.soccer.frames import Box, ImagePoint
@@ -342,20 +342,21 @@ class TestAChangedSource:
         assert [load_group_state(store, number).solution for number in ids] == [None, None]
         assert load_group_state(store, ids[1]).group.views[0].station.lines == moved.lines
 
-    def test_a_match_that_is_named_makes_a_group_of_one_view_stale(
-        self, store, fill, make_group
+    @pytest.mark.parametrize(("before", "after"), [("", "m"), ("m", "")])
+    def test_a_match_that_comes_or_goes_makes_a_group_of_one_view_stale(
+        self, store, fill, make_group, before, after
     ) -> None:
         whole = make_group(9)
-        one = replace(whole, views=whole.views[:1], match="")
+        one = replace(whole, views=whole.views[:1], match=before)
         (number,) = fill(one)
-        assert load_group_state(store, number).solution is not None
-        again(store, replace(one, match="m"))
         state = load_group_state(store, number)
-        assert (state.group.match, state.solution) == ("m", None)
-        with store.write() as session:
-            refresh_inputs_hashes(session, [number])
-        again_read = load_group_state(store, number).stored
-        assert again_read.inputs_hash == state.stored.inputs_hash
+        assert state.solution is not None
+        set_verdict(
+            store, number, "rejected", "not_same_instant", None, if_match=state.etag, actor="ann"
+        )
+        again(store, replace(one, match=after))
+        state = load_group_state(store, number)
+        assert (state.group.match, state.solution, state.verdict.stale) == (after, None, False)
 
     def test_a_static_camera_that_changed_counts_as_changed_once(
         self, store, fill, make_static, monkeypatch

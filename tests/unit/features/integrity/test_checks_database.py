@@ -16,7 +16,6 @@ from app.db.check import CheckResult
 from app.db.dialects.dialect import get_dialect
 from app.db.store import Store
 from app.features.findings.service import FindingReference, set_dismissal
-from app.features.groups.queries import read_groups
 from app.features.groups.replay import rebuild_tables
 from app.features.groups.submit import load_group_state
 from app.features.imports.ingest import import_groups
@@ -24,7 +23,6 @@ from app.features.integrity.checks import REBUILD, examine_database
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
 from app.soccer.annotation import Extras, make_lines
-from app.soccer.codec import hash_group_inputs
 from tests.databases import said_for_sqlite
 from tests.unit.stores import OPPOSITE
 
@@ -250,19 +248,6 @@ class TestExamine:
         assert found.advice == REBUILD
         rebuild_tables(store)
         assert faults(store) == {}
-
-    def test_a_digest_of_before_the_match_of_one_view_counted_is_no_fault(
-        self, store: Store, fill, make_group
-    ) -> None:
-        whole = make_group(9)
-        (number,) = fill(replace(whole, views=whole.views[:1], match="m"))
-        with store.read() as session:
-            group = read_groups(session, [number])[number].group
-        before = hash_group_inputs(replace(group, match=""))
-        assert before != hash_group_inputs(group)
-        for digest, healthy in ((before, True), ("x", False)):
-            change(store, f"UPDATE groups SET inputs_hash = '{digest}' WHERE id = {number}")
-            assert ("digests" not in faults(store)) == healthy
 
     def test_a_text_with_u0000_in_the_log_is_no_fault_and_is_backed_up(
         self, store: Store, make_group, tmp_path: Path
