@@ -280,6 +280,9 @@ def measure_group(
         if _get_recording_metadata(view).get("repeated"):
             unused["frame that repeats the one before"] += ball
             continue
+        if solved.calibration.is_left_open:
+            unused["camera whose lines leave it open"] += ball
+            continue
         views.append(view)
         # A static camera's equal values are one object, so that a solver sees six and not thousands.
         calibrations.append(replace(solved.calibration, camera=camera))

@@ -83,6 +83,20 @@ class TestGatherStretches:
             == "Not measured: 4 balls (not solved), 1 ball (view left out)."
         )
 
+    @pytest.mark.parametrize(("source", "count"), [("points_lines", 1), ("given", 0)])
+    def test_a_camera_that_its_lines_leave_open_measures_no_ball(
+        self, records, source, count
+    ) -> None:
+        first, *others = records[0].solution.views
+        open_camera = replace(first.calibration, source=source, covariance=None)
+        views = (replace(first, calibration=open_camera), *others)
+        opened = replace(records[0], solution=replace(records[0].solution, views=views))
+        stretch = only(gather_stretches([opened, *records[1:3]], PAPER))
+        every = sum(len(item.group.views) for item in records[:3])
+        assert len(stretch.measurements) == every - count
+        assert stretch.unused.get("camera whose lines leave it open", 0) == count
+        assert records[0].group.key in stretch.groups.values()
+
     def test_two_groups_of_one_frame_are_refused_by_their_keys(self, records) -> None:
         twice = replace(records[0], group=replace(records[0].group, key=f"late/{FIRST}.png"))
         with pytest.raises(
