@@ -32,9 +32,10 @@ function follows(group, gate, before) {
 }
 
 /** @param {GroupDocument} group @param {GateJson} gate @param {GateJson[]} before the gates above it @param {boolean} uncertain whether lines leave a camera open */
-function stateOf(group, gate, before, uncertain) {
+export function stateOf(group, gate, before, uncertain) {
 	if (!gate.active) return { state: 'off', glyph: '·', word: 'not required' };
-	if (gate.value === null) return { state: 'off', glyph: '·', word: 'not judged' };
+	// A sigma that is not known has no number either, and fails.
+	if (gate.value === null && (gate.passed || gate.sentence.startsWith('not judged'))) return { state: 'off', glyph: '·', word: 'not judged' };
 	if (gate.passed && gate.name === 'calibratable' && uncertain) return { state: 'doubt', glyph: '!', word: 'passed, with a camera that is uncertain' };
 	if (gate.passed) return { state: 'passed', glyph: '✓', word: 'passed' };
 	if (follows(group, gate, before)) return { state: 'follows', glyph: '↳', word: 'fails because of the gate above' };
