@@ -517,7 +517,11 @@ class TestStation:
         until(page, lambda: page.request.get(station).json()["can_undo"])
 
         page.get_by_role("button", name="Adjust all static cameras").click()
-        dialog.get_by_role("button", name="Restore the previous cameras").click()
+        restore = dialog.get_by_role("button", name="Restore the previous cameras")
+        expect(restore).to_be_hidden()
+        dialog.get_by_role("button", name="Propose").click()
+        expect(dialog).to_contain_text("were adjusted already")
+        restore.click()
         expect(dialog).to_be_hidden()
         expect(page.locator(".station-card__work")).to_be_visible()
         # While the groups are solved anew, their state changes.

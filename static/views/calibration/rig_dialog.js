@@ -2,13 +2,11 @@
 /** All static cameras adjusted together: what that would change, then saved or taken back. */
 
 import { html } from 'htm/preact';
-import { useCallback, useState } from 'preact/hooks';
+import { useState } from 'preact/hooks';
 
-import { getStation } from '../../api/calibration.js';
 import { ApiError, sentenceOf } from '../../api/problem.js';
 import { deleteRig, postRig } from '../../api/match_estimates.js';
 import { capital, count, fixed, metres, pixelText, pixels, plural } from '../../lib/format.js';
-import { useResource } from '../../lib/resource.js';
 import { follow, isOver } from '../../state/jobs.js';
 import { announce } from '../../state/notice.js';
 import { watchSolving } from '../../state/solving.js';
@@ -58,24 +56,21 @@ function Proposal({ proposal }) {
 	`;
 }
 
-/** @param {{dataset: {id: number, name: string}, station: number, onClose: () => void}} props */
-export function RigDialog({ dataset, station, onClose }) {
+/** @param {{dataset: {id: number, name: string}, onClose: () => void}} props */
+export function RigDialog({ dataset, onClose }) {
 	const [job, setJob] = useState(/** @type {JobJson | null} */ (null));
 	const [proposal, setProposal] = useState(/** @type {RigProposal | null} */ (null));
 	const [what, setWhat] = useState(/** @type {Accepted} */ ('sigma'));
 	const [problem, setProblem] = useState(/** @type {{text: string, adjusted: boolean} | null} */ (null));
-	const read = useCallback((/** @type {AbortSignal} */ signal) => getStation(station, signal), [station]);
-	const present = useResource(read, [station]);
-	const adjusted = problem?.adjusted || (present.value?.has_given_covariance && present.value.can_undo);
 	const busy = job !== null && !isOver(job);
-	/** @param {() => Promise<void>} act */
-	async function attempt(act) {
+	/** @param {() => Promise<void>} act @param {boolean} proposes refused (409) where the cameras were adjusted already, which can be undone */
+	async function attempt(act, proposes) {
 		setProblem(null);
 		try {
 			await act();
 		} catch (error) {
 			setJob(null);
-			setProblem({ text: sentenceOf(error), adjusted: error instanceof ApiError && error.status === 409 });
+			setProblem({ text: sentenceOf(error), adjusted: error instanceof ApiError && error.status === 409 ? proposes : Boolean(problem?.adjusted) });
 		}
 	}
 	async function send() {
@@ -92,7 +87,7 @@ export function RigDialog({ dataset, station, onClose }) {
 			announce(what === 'cameras' ? 'The adjusted cameras are used.' : 'The cameras stay; their uncertainty is saved.');
 			watchSolving(dataset.name);
 			onClose();
-		});
+		}, true);
 	}
 	async function takeBack() {
 		await attempt(async () => {
@@ -100,13 +95,13 @@ export function RigDialog({ dataset, station, onClose }) {
 			announce(`${plural(cameras, 'camera')} ${cameras === 1 ? 'is' : 'are'} restored.`);
 			watchSolving(dataset.name);
 			onClose();
-		});
+		}, false);
 	}
 	return html`
 		<${FormDialog}
 			wide=${true} title="Adjust static cameras together" onClose=${onClose} onSubmit=${send}
 			buttons=${html`
-				${adjusted ? html`<button class="button" type="button" onClick=${takeBack}>Restore the previous cameras</button>` : null}
+				${problem?.adjusted ? html`<button class="button" type="button" onClick=${takeBack}>Restore the previous cameras</button>` : null}
 				<button class="button button--primary" type="submit" aria-disabled=${busy} title=${busy ? 'Under way' : ''}>${proposal ? 'Save' : 'Propose'}</button>`}
 		>
 			<p>Balls that several cameras show at once align the cameras with each other; field lines and the cameras in use keep them in place. A preview shows what changes before anything is saved.</p>

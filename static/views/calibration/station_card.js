@@ -22,7 +22,7 @@ export function StationCard({ view, station, dataset }) {
 			<h2>Static camera ${view.station.key}</h2>
 			<p>Saving changes the view of this camera in <strong>${all}</strong>. This group is updated at once, the others are solved in the background.</p>
 			<p><button data-needs="lead" class="button button--small" type="button" onClick=${() => setAdjusting(true)}>Adjust all static cameras…</button></p>
-			${adjusting ? html`<${RigDialog} dataset=${dataset} station=${view.station.id} onClose=${() => setAdjusting(false)} />` : null}
+			${adjusting ? html`<${RigDialog} dataset=${dataset} onClose=${() => setAdjusting(false)} />` : null}
 			${work ? html`
 				<p class="station-card__work" role="status">
 					<span>${work.sentence}${work.total ? ` ${count(work.done)} of ${count(work.total)}` : ''}</span>
