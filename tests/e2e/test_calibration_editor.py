@@ -10,6 +10,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.soccer.pitch import MARKINGS
+from tests.e2e.conftest import Console
 from tests.e2e.screen import (
     at_rest,
     hears,
@@ -484,8 +485,9 @@ class TestStation:
         jobs_end(page, film)
 
     def test_all_static_cameras_are_adjusted_and_that_is_taken_back(
-        self, open_page: OpenPage, film: str
+        self, open_page: OpenPage, film: str, console: Console
     ) -> None:
+        console.expect("a status of 409")
         page = open_page(None)
         timeline = page.request.get(f"{film}/api/v1/datasets/film/timeline").json()
         editor = Editor(page, film, timeline["id"][0], 2)
