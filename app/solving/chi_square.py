@@ -79,17 +79,18 @@ def fit_balls_and_test_residuals(
     """Fit one ball to all clicks of each group, and test the residuals.
 
     A click's uncertainty is that of the hand and of its camera, as for every sigma. Lenses
-    are linear around the click, which is exact to a thousandth of the residual.
+    are linear around the click, which is exact to a thousandth of the residual. Views whose lines
+    leave their camera open have residuals of no known size, and do not count.
 
     Args:
         facts: The groups.
-        used: Views that count, shape (V,); a group needs two.
+        used: Views that count, shape (V,); a group needs two that are not left open.
         start: A point of each group near the ball, metres, NaN where there is none, shape (G, 3).
         policy: How noisy a click is.
 
     Source: Hartley & Zisserman, sec. 12.5 and 5.3 (minimum of the residuals, and its expectation).
     """
-    views = np.flatnonzero(used & np.isfinite(facts.view_axis[:, 0]))
+    views = np.flatnonzero(used & ~facts.view_open & np.isfinite(facts.view_axis[:, 0]))
     return _test_residuals(facts, views, facts.view_group[views], start, policy)
 
 
@@ -135,18 +136,21 @@ def p_values(facts: GroupFacts, used: BoolArray, start: FloatArray, policy: Poli
 
 
 def find_untestable_groups(facts: GroupFacts, used: BoolArray, policy: Policy) -> BoolArray:
-    """Groups whose residuals say nothing: nobody says how exact one of their cameras is, (G,).
+    """Groups whose residuals say nothing, shape (G,): nobody says how exact one of their given cameras
+    is, or lines leave all but one of their cameras open.
 
     Args:
         facts: The groups.
         used: Views that count, shape (V,).
         policy: Its ``given_sigma_px`` says it of given cameras without covariance.
     """
-    unknown = used & ~facts.view_known
-    if policy.given_sigma_px:
-        unknown &= ~facts.view_bare
     found = np.zeros(facts.groups, bool)
-    found[facts.view_group[unknown]] = True
+    if not policy.given_sigma_px:
+        found[facts.view_group[used & facts.view_bare]] = True
+    left_open = used & facts.view_open
+    rest = np.bincount(facts.view_group[used & ~left_open], minlength=facts.groups)
+    with_open = facts.view_group[left_open]
+    found[with_open] |= rest[with_open] < 2
     return found
 
 

@@ -72,7 +72,8 @@ class Contradiction:
 def compute_chi_square(
     keys: Sequence[str], facts: GroupFacts, judgement: Judgement, policy: Policy
 ) -> ChiSquare | None:
-    """The test of a group's residuals; None where no ball lies in front of all views.
+    """The test of a group's residuals; None where no ball lies in front of all views, and where fewer
+    than two of them have a camera that its lines do not leave open.
 
     Args:
         keys: Of the views.
@@ -80,7 +81,7 @@ def compute_chi_square(
         judgement: What the policy makes of them.
         policy: How noisy a click is.
     """
-    used = find_views_in_pairs(facts, judgement.valid)
+    used = find_views_in_pairs(facts, judgement.valid) & ~facts.view_open
     found = fit_balls_and_test_residuals(facts, used, judgement.point, policy)
     if not np.isfinite(found.p_value[0]):
         return None
@@ -100,8 +101,7 @@ def find_contradiction(
     observations: Sequence[BallObservation],
     policy: Policy,
 ) -> Contradiction | None:
-    """Where the views of the ball contradict each other; None where they do not, and where the
-    lines of one leave its camera open, for its residuals are of no known size.
+    """Where the views of the ball contradict each other; None where they do not.
 
     Where nobody says how far a given camera is off, that is one more thing that may be wrong.
 
@@ -116,8 +116,6 @@ def find_contradiction(
     if chi_square is None or chi_square.p_value >= LOW_P_VALUE:
         return None
     used = np.array([key in chi_square.views for key in keys])
-    if facts.view_open[used].any():
-        return None
     known = not find_untestable_groups(facts, used, policy)[0]
     chosen = [observation for observation in observations if observation.view in chi_square.views]
     if len(chosen) == 2:

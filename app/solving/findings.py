@@ -18,6 +18,7 @@ from app.solving.gate_sentences import (
     describe_odds,
     describe_open_cameras,
     find_larger_error_in_tau,
+    join_with_and,
 )
 from app.solving.sides import SwappedView, find_swapped_views
 from app.solving.triangulate import BallObservation
@@ -301,12 +302,19 @@ def _make_contradiction_finding(item: Contradiction, group: Group, ball: Ball3D 
     """Views that pass tau and are still farther apart than their uncertainty lets them be."""
     found = item.chi_square
     one = "The two views do" if len(found.views) == 2 else "The views do"
+    if ball is not None and len(found.views) < len(ball.views):
+        letters = [
+            make_view_letter(place)
+            for place, view in enumerate(group.views)
+            if view.key in found.views
+        ]
+        one = f"Views {join_with_and(letters)} do"
     sentences = [
         f"{one} not agree on one ball: consistent views have residuals as large as these "
         f"(χ² {found.value:,.1f}, {plural(found.freedom, 'degree')} of freedom) in "
         f"{describe_odds(found.p_value)}."
     ]
-    if ball is not None and item.widening > 1:
+    if ball is not None and item.widening > 1 and math.isfinite(ball.sigma_m):
         sentences.append(
             f"Because of this, sigma is {item.widening:.1f} times larger: {format_metres(ball.sigma_m)}."
         )

@@ -364,26 +364,42 @@ def describe_open_cameras(letters: Sequence[str]) -> str:
     Example:
         >>> describe_open_cameras(["B"])
         'the lines of view B leave its camera open'
+        >>> describe_open_cameras(["A", "B", "C"])
+        'the lines of views A, B and C leave their cameras open'
     """
     if len(letters) == 1:
         return f"the lines of view {letters[0]} leave its camera open"
-    return f"the lines of views {' and '.join(letters)} leave their cameras open"
+    return f"the lines of views {join_with_and(letters)} leave their cameras open"
+
+
+def join_with_and(letters: Sequence[str]) -> str:
+    """Letters of two or more views in a sentence.
+
+    Example:
+        >>> join_with_and(["A", "B"]), join_with_and(["A", "B", "C"])
+        ('A and B', 'A, B and C')
+    """
+    return f"{', '.join(letters[:-1])} and {letters[-1]}"
 
 
 def _make_chi_square_gate(group: _JudgedGroup, found: ChiSquare | None, policy: Policy) -> Gate:
     threshold, active = policy.min_p_value, policy.min_p_value is not None
-    if found is None:
-        return _make_unjudged_gate("chi_square", threshold, active=active)
     passed = "chi_square" not in group.failed
-    cameras = [view.calibration for view in group.views if view.key in found.views]
-    if active and not all(
-        item.has_known_covariance or (item.is_given_without_uncertainty and policy.given_sigma_px)
-        for item in cameras
-    ):
+    if found is None and not (active and passed):
+        return _make_unjudged_gate("chi_square", threshold, active=active)
+    if found is None or (active and not _has_known_cameras(group, found, policy)):
         sentence = "not judged: a camera has no known uncertainty"
         return Gate("chi_square", passed, None, threshold, None, sentence, active=active)
     sentence = f"{describe_consistency(found.p_value)} ({_format_p_value(found.p_value)})"
     return _make_gate("chi_square", passed, found.p_value, threshold, sentence, active=active)
+
+
+def _has_known_cameras(group: _JudgedGroup, found: ChiSquare, policy: Policy) -> bool:
+    cameras = [view.calibration for view in group.views if view.key in found.views]
+    return all(
+        item.has_known_covariance or (item.is_given_without_uncertainty and policy.given_sigma_px)
+        for item in cameras
+    )
 
 
 def describe_consistency(p_value: float) -> str:

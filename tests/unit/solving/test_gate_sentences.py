@@ -410,8 +410,13 @@ class TestChiSquare:
         assert (found.active, found.passed, found.value) == (False, True, 0.0088)
 
     def test_without_a_ball_it_is_not_judged(self):
-        found = gates([], policy=self.POLICY)["chi_square"]
+        found = gates([], ("chi_square",), policy=self.POLICY)["chi_square"]
         assert found == Gate("chi_square", False, None, 0.002, None, "not judged")
+
+    def test_passes_where_fewer_than_two_views_can_be_tested(self):
+        found = gates([], ball=BALL, policy=self.POLICY)["chi_square"]
+        sentence = "not judged: a camera has no known uncertainty"
+        assert found == Gate("chi_square", True, None, 0.002, None, sentence)
 
     @pytest.mark.parametrize(
         ("p_value", "words"),

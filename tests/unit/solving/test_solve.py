@@ -156,6 +156,23 @@ class TestCamerasThatLinesLeaveOpen:
         assert finding.is_unusable_ball and failing.sentence in finding.sentence
         assert all(not np.isfinite(one.expected.covariance).any() for one in solution.views)
 
+    @pytest.mark.parametrize(("count", "tested"), [(2, None), (3, ("b", "c"))])
+    def test_the_others_alone_are_tested(self, views, count, tested):
+        solution = solve_group(group(*views[:count]), replace(PAPER, min_p_value=1e-9))
+        assert solution.passes
+        found = solution.chi_square
+        assert (None if found is None else found.views) == tested
+        (gate,) = [gate for gate in solution.gates if gate.name == "chi_square"]
+        assert gate.passed and (gate.value is None) == (tested is None)
+        assert gate.sentence.startswith("not judged") == (tested is None)
+
+    def test_the_others_are_named_where_they_contradict_each_other(self, views):
+        late = view("c", OPPOSITE, np.add(BALL, (0.0, 0.4, -0.4)), noise_px=0.3, seed=2)
+        solution = solve_group(group(*views[:2], late), replace(PAPER, tau_percent=5.0))
+        (finding,) = [one for one in solution.findings if one.kind == "views_contradict"]
+        assert finding.sentence.startswith("Views B and C do not agree on one ball")
+        assert "inf" not in finding.sentence
+
     def test_what_is_stored_and_served_has_no_infinity(self, views):
         said = group(*views[:2])
         solution = solve_group(said, PAPER)
