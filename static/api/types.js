@@ -214,8 +214,8 @@
  * @typedef {object} Ball3DJson
  * @property {[number, number, number]} point
  * @property {number} height_m
- * @property {number} sigma_m
- * @property {number[]} covariance
+ * @property {number | null} sigma_m null: not known, because lines leave a camera open
+ * @property {(number | null)[]} covariance
  * @property {number} parallax_degrees
  * @property {string[]} views
  */
@@ -224,8 +224,8 @@
  * @typedef {object} BestBallJson the most likely point over all views
  * @property {[number, number, number]} point
  * @property {number} height_m
- * @property {number} sigma_m
- * @property {number[]} covariance
+ * @property {number | null} sigma_m null: not known, because lines leave a camera open
+ * @property {(number | null)[]} covariance
  * @property {string[]} views
  * @property {string[]} [contradicting] views that speak against it
  */
