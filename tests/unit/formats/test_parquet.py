@@ -148,12 +148,15 @@ class TestWriteParquet:
         assert (fallen["ball_3d_x"], fallen["pan_degrees"], fallen["covariance"]) == (None,) * 3
         assert fallen["view_failed"] == "jac"
 
-    def test_a_view_without_a_ball_has_no_box(
-        self, tmp_path: Path, solved: Solved, soccer_group: Make
+    @pytest.mark.parametrize("balls", [0, 2])
+    def test_a_view_without_one_ball_has_no_box(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, balls: int
     ) -> None:
         group = soccer_group()
-        bare = group.with_view(replace(group.views[0], balls=()))
-        counts = write_parquet(tmp_path, [solved(bare)])
+        first = group.views[0]
+        counts = write_parquet(
+            tmp_path, [solved(group.with_view(replace(first, balls=first.balls[:1] * balls)))]
+        )
         assert [row["box_x"] is None for row in rows(tmp_path)] == [True, False]
         assert counts["boxes"] == 1
 
