@@ -128,9 +128,14 @@ def _require_groups_that_others_name(session: Session, kept: Collection[int]) ->
     gone = [number for number in session.scalars(select(GroupModel.id)) if number not in kept]
     if not gone:
         return
+    replaced = {
+        model.__table__
+        for model in (ImportFindingModel, QueueModel, UnassignedFrameModel, ViewModel)
+    }
     naming = [
         table.name
         for table in Base.metadata.sorted_tables
+        if table not in replaced
         for key in table.foreign_keys
         if key.column.table is GroupModel.__table__
         and key.ondelete is None

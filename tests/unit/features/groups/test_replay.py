@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import pytest
 from sqlalchemy import Table, insert, select, text
@@ -163,8 +164,8 @@ class TestRebuild:
                 [dict(row._mapping) for row in session.execute(select(*model.__table__.columns))]
                 for model in (StationModel, GroupModel, ViewModel)
             )
-            session.execute(text("DELETE FROM solution"))
-            left_out = replace_all_rows(
+            rebuilt = partial(
+                replace_all_rows,
                 session,
                 stations=stations,
                 groups=groups[1:],
@@ -172,6 +173,10 @@ class TestRebuild:
                 noticed=[],
                 unassigned=[],
             )
+            with pytest.raises(StorageError, match=f"the groups {ids[0]}, .* the tables solution;"):
+                rebuilt()
+            session.execute(text("DELETE FROM solution"))
+            left_out = rebuilt()
         has_not = "left out: the log does not have"
         assert f"1 row of the table gold {has_not} groups {ids[0]}" in left_out
         assert f"1 row of the table proposal {has_not} view {views[0]['id']}" in left_out
