@@ -108,8 +108,16 @@ export function ExportDialog({ one, version = null, onClose }) {
 	const noViews = unused('views', 'Only COCO and YOLO leave out unconfirmed balls');
 	const none = !version && !all && one.accepted === 0 && chosen !== 'touchline' ? 'No group is accepted yet' : '';
 	const why = state.busy ? 'Under way' : checking ? 'Checking which formats are possible' : isPossible(chosen) ? none : reasons.find(({ format }) => format === chosen)?.reason ?? '';
+	// Who asks while the formats are checked is answered then.
+	const [asked, setAsked] = useState(/** @type {FormData | null} */ (null));
+	useEffect(() => {
+		if (checking || !asked) return;
+		setAsked(null);
+		void send(asked);
+	}, [checking, asked]);
 	/** @param {FormData} form */
 	async function send(form) {
+		if (checking) setAsked(form);
 		if (why) return;
 		setState({ busy: true, job: null, made: null, error: null });
 		try {
@@ -153,7 +161,7 @@ export function ExportDialog({ one, version = null, onClose }) {
 				${state.made ? html`<${Result} made=${state.made} />` : null}
 				${none ? html`<p class="note">${none}: accept groups, or export all.</p>` : null}
 				<p class="dialog__buttons">
-					<button class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>${state.busy ? 'Exporting…' : 'Export'}</button>
+					<button class="button button--primary" type="submit" aria-disabled=${why !== ''} title=${why}>${state.busy || asked ? 'Exporting…' : 'Export'}</button>
 				</p>
 			</form>
 		</dialog>

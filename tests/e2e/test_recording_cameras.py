@@ -128,7 +128,7 @@ def test_a_shot_is_tracked_and_lines_follow_its_frames(recording: int, open_page
     expect(outcomes).to_have_count(3)
     expect(outcomes.nth(1)).to_contain_text("frames 3 to 4: lost")
     charts = page.get_by_role("region", name="Cameras over time").get_by_role("img")
-    expect(charts).to_have_count(4)
+    expect(charts).to_have_count(5)
     charts.first.locator(".u-over").click()
     assert page.locator(".film__time").inner_text().split("frame ")[1].startswith("3")
     with page.expect_download() as saved:

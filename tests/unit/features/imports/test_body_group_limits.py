@@ -55,7 +55,7 @@ class TestViews:
         )
         (problem,) = report.problems
         assert (problem.path, problem.record) == ("files", group.key)
-        assert problem.problem == "has 101 views; the limit is 100: it is left out"
+        assert problem.problem == "has 101 views; the limit is 100, so the group is left out"
 
 
 class TestPoints:

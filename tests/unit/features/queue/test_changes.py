@@ -153,7 +153,7 @@ class TestReadSolved:
     def test_who_is_up_to_date_hears_of_solutions_although_another_listener_is_behind(
         self, store: Store, fill, make_group
     ) -> None:
-        one, two = fill(make_group(1), make_group(2))
+        one, two = fill(make_group(1), make_group(2), solved=False)
         with store.read() as session:
             entry, solution = find_newest_entry_id(session), find_newest_solution_id(session)
         solve_dataset(store, "demo")
