@@ -29,7 +29,7 @@ export function ReassignDialog({ one, onClose, onDone }) {
 			<div class="form__row"><label for="give-name">Name</label><input class="field" id="give-name" name="name" required maxlength="80" autocomplete="off" defaultValue=${batch.name} /></div>
 			<div class="form__columns">
 			<div class="form__row"><label for="give-due">Due</label><input class="field" id="give-due" name="due" type="date" defaultValue=${batch.due ?? ''} /></div>
-			${batch.kind === 'tracks' ? null : html`<div class="form__row"><label for="give-gold">One gold group in every N of an annotator</label><input class="field" id="give-gold" name="gold" type="number" min="1" max="1000" placeholder="none" defaultValue=${goldEvery ?? ''} /></div>`}
+			${batch.kind === 'tracks' ? null : html`<div class="form__row"><label for="give-gold">Gold groups: one in every N groups of an annotator</label><input class="field" id="give-gold" name="gold" type="number" min="1" max="1000" placeholder="none" defaultValue=${goldEvery ?? ''} /></div>`}
 			</div>
 			<${PeopleChoice} dataset=${batch.dataset} chosen=${people} choose=${setPeople} parts=${batch.kind === 'tracks' ? ['reviewer'] : undefined} />
 			${error ? html`<${FormError} error=${error} />` : null}
