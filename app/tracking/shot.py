@@ -216,9 +216,13 @@ def _follow_forwards(
 
 def _find_runs_without_paint(frames: Sequence[TrackedFrame]) -> list[tuple[int, int]]:
     """First and end of each run of frames that no paint holds."""
-    open_ = [frame.outcome != TRACKED and not frame.is_key for frame in frames]
-    edges = np.flatnonzero(np.diff([False, *open_, False]))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    return _find_runs([frame.outcome != TRACKED and not frame.is_key for frame in frames])
+
+
+def _find_runs(flags: Sequence[bool]) -> list[tuple[int, int]]:
+    """First and end of each run of frames that a flag is set for."""
+    edges = np.flatnonzero(np.diff([False, *flags, False])).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
 
 
 def _follow_run(
@@ -305,9 +309,7 @@ def _drop_cameras_of_unconfirmed_runs(
 ) -> None:
     """Take the cameras of runs that tie to no key frame, unless their own paint says the same."""
     keys = [frame.camera for frame in frames if frame.is_key and frame.camera is not None]
-    held = [frame.outcome != LOST for frame in frames]
-    edges = np.flatnonzero(np.diff([False, *held, False]))
-    for start, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for start, end in _find_runs([frame.outcome != LOST for frame in frames]):
         run = frames[start:end]
         if any(frame.is_key for frame in run):
             continue
@@ -365,11 +367,9 @@ def _stand_on_one_tripod(
 
     On a pitch that is not quite the plan, cameras of one tripod lie metres apart.
     """
-    held = [frame.outcome != LOST for frame in frames]
-    edges = np.flatnonzero(np.diff([False, *held, False]))
     known = [
         frame
-        for start, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+        for start, end in _find_runs([frame.outcome != LOST for frame in frames])
         if any(frame.is_key for frame in frames[start:end])
         for frame in frames[start:end]
         if frame.outcome == TRACKED

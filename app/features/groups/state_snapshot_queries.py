@@ -13,7 +13,7 @@ from typing import Any
 
 from sqlalchemy import and_, delete, insert, or_, select, text
 
-from app.db.dialects.dialect import DeferReferences
+from app.db.dialects.dialect import DeferReferences, select_from_number_list
 from app.db.json_columns import decompress_json
 from app.db.session import Session
 from app.errors import StorageError
@@ -139,11 +139,13 @@ def _require_groups_that_others_name(session: Session, kept: Collection[int]) ->
         for key in table.foreign_keys
         if key.column.table is GroupModel.__table__
         and key.ondelete is None
-        and session.scalar(select(key.parent).where(key.parent.in_(gone[:_BATCH])).limit(1))
+        and session.scalar(
+            select(key.parent).where(key.parent.in_(select_from_number_list(gone))).limit(1)
+        )
     ]
     if naming:
         raise StorageError(
-            f"the log does not have the groups {', '.join(map(str, gone[:_MOST_NAMED]))}, of which there are"
+            f"the log does not have the groups {_name_some(gone)}, of which there are"
             f" rows in the tables {', '.join(naming)}; nothing was changed",
             hint="Restore a backup: touchline restore BACKUP.",
         )
@@ -203,11 +205,15 @@ def _describe_lost_rows(table: str, of: str, ids: Sequence[int | None]) -> list[
     if not ids:
         return []
     named = sorted({number for number in ids if number is not None})
-    more = f" and {len(named) - _MOST_NAMED:,} more" if len(named) > _MOST_NAMED else ""
     return [
         f"{plural(len(ids), 'row')} of the table {table} left out: the log does not have {of}"
-        f" {', '.join(map(str, named[:_MOST_NAMED]))}{more}"
+        f" {_name_some(named)}"
     ]
+
+
+def _name_some(ids: Sequence[int]) -> str:
+    more = f" and {len(ids) - _MOST_NAMED:,} more" if len(ids) > _MOST_NAMED else ""
+    return ", ".join(map(str, ids[:_MOST_NAMED])) + more
 
 
 _ELSEWHERE = Station("", ImageSize(0, 0))

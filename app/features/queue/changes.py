@@ -85,14 +85,12 @@ def read_new_changes(store: Store, places: Collection[tuple[int, int]]) -> NewCh
     """What has changed since some places: each an entry of the log and a solution."""
     with store.read() as session:
         newest, last = find_newest_entry_id(session), find_newest_solution_id(session)
-        changes = {
-            entry: read_changes(session, entry) for entry, _ in set(places) if entry < newest
-        }
+        changes = {entry: read_changes(session, entry) for entry, _ in places if entry < newest}
         solved = {
             (entry, solution): read_newly_solved_groups(
                 session, solution, {item.group_id for item in changes.get(entry, ())}
             )
-            for entry, solution in set(places)
+            for entry, solution in places
             if solution < last
         }
     return NewChanges(newest, last, changes, solved)
