@@ -265,21 +265,23 @@ class SharedJobs(Jobs):
             rows = read_jobs(session, states=OPEN, limit=MOST)
         for job in reversed(rows):
             self._apply_cancellation(job)
-            if job.state == RUNNING and job.ending:
-                self._end_job_without_run(job.id)
+            if job.state == RUNNING and self._queue.find_running(job.id) is None:
+                self._settle_job_without_run(job.id)
             if job.state == WAITING and all(run.job.id != job.id for run in self._queue.all_runs):
                 self._enqueue_job(job)
 
-    def _end_job_without_run(self, job_id: int) -> None:
-        """End a job that shall end and that nobody works on, as where its end could not be written."""
-        if job_id in self._unwritten or self._queue.find_running(job_id) is not None:
-            return
-        with self._store.write() as session:
-            job = read_job(session, job_id)
-            if job is None or job.state != RUNNING or self._queue.find_running(job_id) is not None:
+    def _settle_job_without_run(self, job_id: int) -> None:
+        """Settle a job that runs by its row alone: its start was kept though the answer to it was lost,
+        or its end could not be written."""
+        with self._writing_ends:
+            if job_id in self._unwritten:
                 return
-            self._recover_job(session, job)
-            job = require_job(session, job_id)
+            with self._store.write() as session:
+                job = read_job(session, job_id)
+                if job is None or job.state != RUNNING or self._queue.find_running(job_id) is not None:
+                    return
+                self._recover_job(session, job)
+                job = require_job(session, job_id)
         self._announce_job_change(job)
 
     def _apply_cancellation(self, job: Job) -> None:

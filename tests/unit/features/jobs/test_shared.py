@@ -142,6 +142,18 @@ class TestSharedJobs:
         asked.cancel(job, by="ann")
         assert leads.wait(job, SECONDS).state == "cancelled"
 
+    def test_a_job_whose_start_was_kept_though_its_answer_was_lost_is_begun_again_by_who_leads(
+        self, opened: Open, work: Work, store: Store
+    ) -> None:
+        leads = opened()
+        leads.start()
+        with store.write() as session:
+            job = insert_job(session, NewJob("solve", "Solve", "ann"))
+            update_job(session, job, state="running", begun=1)
+        assert work.begun.acquire(timeout=SECONDS)
+        work.go_on.release()
+        assert leads.wait(job, SECONDS).state == "done"
+
     def test_what_runs_writes_nothing_after_it_was_told_to_end_elsewhere(
         self, store: Store, opened: Open, work: Work
     ) -> None:
