@@ -71,7 +71,7 @@ def serve(
     with hold_server_lock(settings, shared=not get_dialect(settings).is_file):
         _prepare_home(settings)
         if not settings.team and team is None:
-            with open_store(settings) as store:
+            with open_store(settings, may_create=True) as store:
                 require_no_people(store)
         if with_sample:
             _make_sample(settings)
@@ -109,7 +109,10 @@ def _make_sample(settings: Settings) -> None:
     from app.workers.executors import open_executor
 
     folder, pool = settings.home / SAMPLE, partial(open_executor, settings)
-    with open_store(settings) as store, show_progress("Making the sample") as progress:
+    with (
+        open_store(settings, may_create=True) as store,
+        show_progress("Making the sample") as progress,
+    ):
         make_sample_dataset(
             store, SAMPLE, folder, SampleOrder(), pool, progress, actor=get_current_actor()
         )
@@ -129,7 +132,7 @@ def _serve_process(settings: Settings, socket: socket) -> None:
 def _print_address(settings: Settings, address: str) -> None:
     say(f"Touchline is at {address}")
     if settings.team:
-        with open_store(settings) as store:
+        with open_store(settings, may_create=True) as store:
             _print_first_admin_link(store, settings.url or address)
 
 

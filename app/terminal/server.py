@@ -210,12 +210,25 @@ def _translate_client_error(server: ServerPlace, error: Exception) -> ReviewErro
 
 
 @contextmanager
-def open_store(settings: Settings | None = None) -> Iterator[Store]:
-    """The database of a home; by default the one that the environment names."""
+def open_store(settings: Settings | None = None, *, may_create: bool = False) -> Iterator[Store]:
+    """The database of a home; by default the one that the environment names.
+
+    Raises:
+        InputError: The home has no database, and the command may not create one.
+    """
     require_no_server()
+    from app.db.dialects.dialect import get_dialect
+    from app.db.recovery.preopen_check import require_database
     from app.db.store import Store
 
-    with closing(Store.open(settings or read_settings())) as store:
+    settings = settings or read_settings()
+    if get_dialect(settings).is_file and not may_create:
+        require_database(
+            settings,
+            "Set TOUCHLINE_HOME to the home folder of an installation; touchline import and"
+            " touchline serve begin a new one.",
+        )
+    with closing(Store.open(settings)) as store:
         yield store
 
 

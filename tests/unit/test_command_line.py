@@ -199,7 +199,8 @@ class TestNames:
         assert err.endswith(" cannot be used: File name too long\n")
         assert len(err) < 300
 
-    def test_one_that_is_no_text_is_said_so(self, run: Run) -> None:
+    def test_one_that_is_no_text_is_said_so(self, run: Run, line_files: Path) -> None:
+        run("import", "sn-calibration", line_files, "--dataset", "sn")
         code, _, err = run("findings", "--dataset", "a\udcff")
         assert (code, err) == (1, '"a\\udcff" contains bytes that are not UTF-8 text\n')
 
@@ -329,7 +330,8 @@ class TestSolve:
     def test_a_policy_that_there_is_not_is_wrong_usage(self, run: Run) -> None:
         assert run("solve", "--dataset", "sn", "--policy", "lenient")[0] == 2
 
-    def test_an_unknown_dataset_is_one_sentence(self, run: Run) -> None:
+    def test_an_unknown_dataset_is_one_sentence(self, run: Run, line_files: Path) -> None:
+        run("import", "sn-calibration", line_files, "--dataset", "sn")
         code, out, err = run("solve", "--dataset", "nothing")
         assert (code, out) == (1, "")
         assert 'there is no dataset "nothing"' in err

@@ -177,7 +177,7 @@ def import_(
     )
     source.require_used_options(policy=policy is not None)
     chosen = read_policy_option(policy or "paper")
-    with open_store(settings) as store, show_progress("Importing") as progress:
+    with open_store(settings, may_create=True) as store, show_progress("Importing") as progress:
         imported = import_source(
             store, dataset, source, settings, progress,
             actor=get_current_actor(), dry_run=dry_run, policy=chosen,

@@ -278,7 +278,11 @@ class SharedJobs(Jobs):
                 return
             with self._store.write() as session:
                 job = read_job(session, job_id)
-                if job is None or job.state != RUNNING or self._queue.find_running(job_id) is not None:
+                if (
+                    job is None
+                    or job.state != RUNNING
+                    or self._queue.find_running(job_id) is not None
+                ):
                     return
                 self._recover_job(session, job)
                 job = require_job(session, job_id)

@@ -47,7 +47,7 @@ def add(
     from app.features.people.invitations import invite_person
 
     wanted, post = _parse_role(role), _make_mailer()
-    with open_store() as store:
+    with open_store(may_create=True) as store:
         _, row = invite_person(store, name, wanted, email, post, actor=get_current_actor())
     _print_link(row, json_)
 
@@ -72,7 +72,7 @@ def invite_many(
     except UnicodeDecodeError as error:
         raise InputError(f"{file.name} is not UTF-8 text", hint="Save it as CSV UTF-8.") from error
     rows, post = parse_invitation_list(text), _make_mailer()
-    with open_store() as store:
+    with open_store(may_create=True) as store:
         report = invite(store, rows, post, actor=get_current_actor(), dry_run=dry_run)
     refused = sum(row.state == "refused" for row in report)
     if json_:

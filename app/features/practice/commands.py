@@ -54,7 +54,10 @@ def sample(
         set_private_umask()
     settings = read_settings()
     folder, pool = out or settings.home / SAMPLE, partial(open_executor, settings, workers)
-    with open_store(settings) as store, show_progress("Making the sample") as progress:
+    with (
+        open_store(settings, may_create=True) as store,
+        show_progress("Making the sample") as progress,
+    ):
         made = make_sample_dataset(
             store,
             dataset,
@@ -99,7 +102,10 @@ def practice(
 
     set_private_umask()
     settings = read_settings()
-    with open_store(settings) as store, show_progress("Making the practice groups") as progress:
+    with (
+        open_store(settings, may_create=True) as store,
+        show_progress("Making the practice groups") as progress,
+    ):
         made = make_practice_dataset(
             store, settings, progress, again=again, actor=get_current_actor()
         )

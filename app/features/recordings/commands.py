@@ -41,7 +41,7 @@ def _import_videos_locally(paths: Sequence[Path], dataset: str) -> list[dict[str
 
     files = [require_video_file(path.resolve()) for path in paths]
     found = []
-    with open_store() as store, show_progress("Indexing") as progress:
+    with open_store(may_create=True) as store, show_progress("Indexing") as progress:
         actor = get_current_actor()
         for file in files:
             recording = add_recording(store, dataset, file, actor=actor)

@@ -38,6 +38,17 @@ class TestList:
         assert [item["name"] for item in json.loads(done.stdout)] == ["one", "two"]
         assert "two" in CliRunner().invoke(app, ["datasets", "list"]).stdout
 
+    @pytest.mark.file_of_sqlite("a mistyped home has no file")
+    @pytest.mark.parametrize("words", [["datasets", "list"], ["solve", "--dataset", "one"]])
+    def test_a_mistyped_home_is_refused_and_not_made(
+        self, words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        home = tmp_path / "mistyped"
+        monkeypatch.setenv("TOUCHLINE_HOME", str(home))
+        done = CliRunner().invoke(app, words)
+        assert done.exit_code == 1
+        assert not home.exists()
+
 
 class TestDelete:
     def test_asks_for_the_name(self, store: Store) -> None:
