@@ -12,6 +12,7 @@ import { count, counted, plural, words } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
 import { dataset, loadDatasets } from '../state/datasets.js';
 import { isOver } from '../state/jobs.js';
+import { ConfirmButton } from './confirm_button.js';
 import { ExportDialog } from './export_dialog.js';
 import { FormError } from './form_error.js';
 import { Loading, PageFrame, Trouble } from './page_frame.js';
@@ -49,7 +50,7 @@ function Row({ row, remove, again }) {
 			<td><span class="table__actions">
 				${row.content ? html`<a class="button button--small" href=${row.content} download>Download<span class="hidden-text"> export ${row.id}</span></a>` : null}
 				${row.status === 'expired' ? html`<button class="button button--small" type="button" data-needs="review" data-of=${row.request.dataset} title="The file was deleted after some days. Export the dataset again, in its present state" onClick=${again}>Export again<span class="hidden-text">: export ${row.id}</span></button>` : null}
-				${open ? html`<a class="button button--small" href="/jobs">Job<span class="hidden-text"> of export ${row.id}</span></a>` : ['ready', 'failed', 'cancelled'].includes(row.status) ? html`<button class="button button--small" type="button" data-needs="lead" data-of=${row.request.dataset} onClick=${remove}>Delete<span class="hidden-text"> export ${row.id}</span></button>` : null}
+				${open ? html`<a class="button button--small" href="/jobs">Job<span class="hidden-text"> of export ${row.id}</span></a>` : ['ready', 'failed', 'cancelled'].includes(row.status) ? html`<${ConfirmButton} small=${true} of=${row.request.dataset} label="Delete" question="Delete for good?" what=${`export ${row.id}`} run=${remove} />` : null}
 			</span></td>
 		</tr>
 	`;

@@ -3,6 +3,7 @@
 
 import { html } from 'htm/preact';
 
+import { ConfirmButton } from './confirm_button.js';
 import { When } from './when.js';
 
 /** @import {TokenJson} from '../api/tokens.js' */
@@ -22,7 +23,9 @@ export function TokenTable({ tokens, end }) {
 					<td>${one.dataset ?? 'all datasets'}</td>
 					<td>${one.used ? html`<${When} at=${one.used} />` : 'never'}</td>
 					<td>${one.expired ? 'expired' : dayOf(one.expires)}</td>
-					<td><span class="table__actions"><button class="button button--small ${one.expired ? '' : 'button--danger'}" type="button" aria-label=${`${one.expired ? 'Remove' : 'Revoke'} ${one.name}`} onClick=${() => end(one.id)}>${one.expired ? 'Remove' : 'Revoke'}</button></span></td>
+					<td><span class="table__actions">${one.expired
+						? html`<button class="button button--small" type="button" onClick=${() => end(one.id)}>Remove<span class="hidden-text"> ${one.name}</span></button>`
+						: html`<${ConfirmButton} small=${true} needs=${null} label="Revoke" question="Revoke for good?" what=${one.name} run=${() => end(one.id)} />`}</span></td>
 				</tr>`)}
 			</tbody>
 		</table></div>

@@ -11,7 +11,7 @@ import { withForm } from '../lib/field.js';
 import { useResource } from '../lib/resource.js';
 import { whyNot } from '../state/rights.js';
 import { CopyField } from './copy_field.js';
-import { ConfirmButton } from './evaluation/confirm_button.js';
+import { ConfirmButton } from './confirm_button.js';
 import { FormError } from './form_error.js';
 import { Trouble } from './page_frame.js';
 import { Term } from './term.js';

@@ -180,6 +180,7 @@ class TestLooking:
         expect(thread).to_be_visible()
         assert screen.document()["verdict"] == before
         thread.get_by_role("button", name="Delete").click()
+        thread.get_by_role("button", name="Delete for good?").click()
         expect(thread).to_have_count(0)
 
     def test_a_comment_that_is_begun_outlives_escape_and_a_reload(self, review: Review) -> None:

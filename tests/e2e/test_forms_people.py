@@ -69,7 +69,10 @@ PEOPLE = [
     ),
     Row(
         "ends one of them",
-        [press("Revoke nightly", "section[aria-labelledby=people-tokens]")],
+        [
+            press("Revoke nightly", "section[aria-labelledby=people-tokens]"),
+            press("Revoke for good? nightly"),
+        ],
         {"DELETE /users/{finn}/tokens/{token}": None},
         hides="section[aria-labelledby=people-tokens] tbody tr",
     ),
@@ -273,9 +276,9 @@ ACCOUNT = [
     ),
     Row(
         "ends the first of them",
-        [press("Revoke plain")],
+        [press("Revoke plain"), press("Revoke for good? plain")],
         {"DELETE /tokens/{plain}": None},
-        hides="button[aria-label='Revoke plain']",
+        hides="tr:has-text('plain') button:has-text('Revoke')",
     ),
     Row(
         "ends a session of the other browser",

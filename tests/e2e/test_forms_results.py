@@ -145,7 +145,7 @@ class TestExports:
         middle = items[1]["id"]
         delete = Row(
             "deletes an export",
-            [press(f"Delete export {middle}")],
+            [press(f"Delete export {middle}"), press(f"Delete for good? export {middle}")],
             {"DELETE /exports/{export}": None},
             hides="a[href='/api/v1/exports/{export}/content']",
         )

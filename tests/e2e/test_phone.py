@@ -146,6 +146,7 @@ class TestReview:
         expect(page.locator(".talk__text").last).to_have_text("The replay is late.")
         assert fits(page) == {}
         page.get_by_role("button", name="Delete your comment").last.tap()
+        page.get_by_role("button", name="Delete for good?").last.tap()
         expect(page.get_by_text("The replay is late.")).to_have_count(0)
 
     def test_a_finger_moves_the_page_and_no_point(self, phone: OpenPhone) -> None:

@@ -58,6 +58,7 @@ class TestSessions:
         assert kept["scopes"] == ["read", "export"]
         assert serious_in_both(page) == []
         page.get_by_role("button", name="Revoke nightly").click()
+        page.get_by_role("button", name="Revoke for good? nightly").click()
         expect(page.get_by_role("button", name="Revoke nightly")).to_be_hidden()
         assert httpx.get(f"{team}/api/v1/datasets", headers=given).status_code == 401
 

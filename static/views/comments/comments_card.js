@@ -12,6 +12,7 @@ import { historyAddress } from '../../state/navigation.js';
 import { complain } from '../../state/notice.js';
 import { commentDraft, composing, openThreads, readThreads, threads } from '../../state/threads.js';
 import { focusView } from '../../state/workspace.js';
+import { ConfirmButton } from '../confirm_button.js';
 import { Letter } from '../letter.js';
 import { Term } from '../term.js';
 import { When } from '../when.js';
@@ -50,7 +51,7 @@ function Comment({ group, thread, one }) {
 			<p class="talk__who"><${Who} actor=${one.actor} /> <${When} at=${one.at} />${one.edited && one.text !== null ? ' · edited' : ''}
 				${one.mine && one.text !== null ? html`<span class="talk__own">
 					<button class="link-button" type="button" data-needs="annotate" onClick=${() => setChanging(true)}>Edit${commentDraft(group, `comment-${one.id}`) ? ' (draft)' : ''}<span class="hidden-text"> your comment</span></button>
-					<button class="link-button" type="button" data-needs="annotate" onClick=${() => act(group, deleteComment(group, thread, one.id))}>Delete<span class="hidden-text"> your comment</span></button>
+					<${ConfirmButton} link=${true} needs="annotate" label="Delete" question="Delete for good?" what="your comment" run=${() => act(group, deleteComment(group, thread, one.id))} />
 				</span>` : null}
 			</p>
 			${one.text === null ? html`<p class="talk__gone">Deleted by its author.</p>` : html`<p class="talk__text">${partsOf(one.text, one.mentions).map((part) => (part.mention ? html`<mark>${part.text}</mark>` : part.text))}</p>`}

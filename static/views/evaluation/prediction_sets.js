@@ -15,7 +15,7 @@ import { FormError } from '../form_error.js';
 import { UploadField } from '../source_choice.js';
 import { When } from '../when.js';
 import { AcceptPredictions } from './accept_predictions.js';
-import { ConfirmButton } from './confirm_button.js';
+import { ConfirmButton } from '../confirm_button.js';
 import { readSize } from './image_size.js';
 
 /** @import {PredictionSet} from '../../api/evaluations.js' */

@@ -12,7 +12,7 @@ import { FormError } from '../form_error.js';
 import { Loading, Trouble } from '../page_frame.js';
 import { When } from '../when.js';
 import { Comparison } from './comparison.js';
-import { ConfirmButton } from './confirm_button.js';
+import { ConfirmButton } from '../confirm_button.js';
 import { FigureCard } from './figure_card.js';
 import { FramesCard } from './frames_card.js';
 import { TableCard } from './table_card.js';

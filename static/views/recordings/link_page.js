@@ -17,7 +17,7 @@ import { instantBeside, markOf, replayFrameAt, withInstant } from '../../state/l
 import { announce, complain, inform } from '../../state/notice.js';
 import { makePlayer } from '../../state/playback.js';
 import { clockOf, matchTime, timecode } from '../../state/shots.js';
-import { ConfirmButton } from '../evaluation/confirm_button.js';
+import { ConfirmButton } from '../confirm_button.js';
 import { FormError } from '../form_error.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
 import { BallCard } from './link_ball.js';

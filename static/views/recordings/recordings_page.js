@@ -14,7 +14,7 @@ import { dataset, datasets, loadDatasets } from '../../state/datasets.js';
 import { isOver } from '../../state/jobs.js';
 import { lengthText } from '../../state/shots.js';
 import { addVideos, videoUploads } from '../../state/video_uploads.js';
-import { ConfirmButton } from '../evaluation/confirm_button.js';
+import { ConfirmButton } from '../confirm_button.js';
 import { FormError } from '../form_error.js';
 import { JobProgress } from '../job_progress.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';

@@ -16,7 +16,7 @@ import { FormError } from '../form_error.js';
 import { Trouble } from '../page_frame.js';
 import { Term } from '../term.js';
 import { When } from '../when.js';
-import { ConfirmButton } from '../evaluation/confirm_button.js';
+import { ConfirmButton } from '../confirm_button.js';
 import { ReassignDialog } from './reassign_dialog.js';
 import { Due, Progress } from './parts.js';
 
