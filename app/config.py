@@ -114,6 +114,7 @@ class ObjectStoreSettings(BaseModel):
 StoreName = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9-]{0,62}$")]
 
 _FILE = "touchline.db"
+_HOST = re.compile(r"[A-Za-z0-9._-]+|\[[0-9A-Fa-f:.]+\]")
 _URL = re.compile(r"https?://(?:[a-z0-9.-]+|\[[0-9a-f:]+\])(?::\d{1,5})?/?")
 
 
@@ -143,7 +144,8 @@ class Settings(BaseSettings):
     """The address that people open, such as https://touchline.example.org, if a proxy with TLS
     stands in front."""
     proxies: list[str] = ["127.0.0.1", "::1"]
-    """Addresses of proxies whose X-Forwarded-For header is trusted, once ``url`` is set."""
+    """Addresses or networks (10.0.0.0/8) of proxies whose X-Forwarded-For header is trusted, once
+    ``url`` is set."""
     webhooks: list[str] = []
     """Allowed addresses of webhooks, such as https://hooks.example.org/touchline, including
     addresses below them."""
@@ -254,8 +256,33 @@ class Settings(BaseSettings):
         if not isinstance(value, str):
             return value
         if value.lstrip().startswith("["):
-            return json.loads(value)
+            try:
+                return json.loads(value)
+            except json.JSONDecodeError:
+                raise ValueError('is not JSON; write it as ["ONE", "ANOTHER"]') from None
         return [part for part in value.split(os.pathsep) if part]
+
+    @field_validator("proxies")
+    @classmethod
+    def _check_proxies(cls, value: list[str]) -> list[str]:
+        for text in value:
+            try:
+                ipaddress.ip_network(text, strict=False)
+            except ValueError:
+                raise ValueError(
+                    f"{text!r} is not an address such as 10.0.0.7, nor a network such as 10.0.0.0/8"
+                ) from None
+        return value
+
+    @field_validator("allowed_hosts")
+    @classmethod
+    def _check_allowed_hosts(cls, value: list[str]) -> list[str]:
+        for text in value:
+            if not _HOST.fullmatch(text):
+                raise ValueError(
+                    f"{text!r} is not a host name; write it without scheme, port and path"
+                )
+        return value
 
     @field_validator("url")
     @classmethod

@@ -44,6 +44,7 @@ def log_to_stderr(form: LogFormat = "text") -> None:
                 foreign_pre_chain=[named, *before], processors=[last, render]
             )
         )
+    logging.captureWarnings(True)
     logging.basicConfig(handlers=[handler], level=logging.WARNING, force=form == "json")
 
 

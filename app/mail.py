@@ -178,6 +178,11 @@ def read_mail_server(settings: Settings) -> MailServer | None:
     """
     host = settings.smtp_host
     if not host:
+        if settings.smtp_from or settings.smtp_user:
+            raise InputError(
+                "TOUCHLINE_SMTP_FROM or TOUCHLINE_SMTP_USER is set without TOUCHLINE_SMTP_HOST",
+                hint="Set the mail server, or unset the others.",
+            )
         return None
     if settings.smtp_security == "none" and not is_local(host):
         raise InputError(

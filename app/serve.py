@@ -74,6 +74,9 @@ def serve(
             with open_store(settings, may_create=True) as store:
                 require_no_people(store)
         if with_sample:
+            # A port that is taken is refused before minutes of work.
+            with open_listening_socket(settings.host, settings.port):
+                pass
             _make_sample(settings)
         with open_listening_socket(settings.host, settings.port) as (socket, address):
             if settings.web_workers > 1:
@@ -93,9 +96,11 @@ def _require_safe_settings(settings: Settings) -> None:
     """Refuse to serve where strangers could come in, or passwords would be read on their way."""
     from app.features.maintenance.service import find_exposure_warning
     from app.features.people.sign_on_rules import read_rules
+    from app.features.webhooks.sender import require_valid_setting
     from app.mail import read_mail_server
 
     read_rules(settings)
+    require_valid_setting(settings)
     read_mail_server(settings)
     problem = find_exposure_warning(settings)
     if problem is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 
 _PLURAL_END = re.compile(r"(?:(?<=x)|(?<=ss))es\b|s\b")
 
@@ -15,6 +16,18 @@ def plural(count: int, one: str, several: str | None = None) -> str:
         ('1 group', '12,764 matches')
     """
     return f"{count:,} {one if count == 1 else several or f'{one}s'}"
+
+
+def is_one_line(text: str) -> bool:
+    r"""Whether a text that people typed has no control character and no end of a line.
+
+    Example:
+        >>> is_one_line("\u30dc\u30fc\u30eb\u3000\u78ba\u8a8d"), is_one_line("two\nlines")
+        (True, False)
+    """
+    return not any(
+        unicodedata.category(character) in ("Cc", "Cs", "Zl", "Zp") for character in text
+    )
 
 
 def format_named_count(count: int, name: str) -> str:

@@ -73,7 +73,7 @@ def parse_number(value: Any) -> float:
     """A finite number; files also spell it as text.
 
     Raises:
-        ValueError: Anything else, a truth value and a blank among it.
+        ValueError: Anything else, booleans and blanks included.
     """
     # Nearly all are, and an export asks for each corner of each box.
     if type(value) is float and math.isfinite(value):
@@ -104,7 +104,7 @@ def _parse_number_text(text: str) -> float:
 
 
 def parse_pixel_coordinate(value: Any) -> float:
-    """A coordinate in an image, pixels; may lie outside the image, but not beyond reason.
+    """A coordinate in an image, pixels; at most a million pixels outside the image.
 
     Raises:
         ValueError: Not a number, or more than a million pixels away.

@@ -58,7 +58,7 @@ def open_output_folder(
         staging = Path(tempfile.mkdtemp(prefix=prefix, suffix=PARTIAL, dir=out.parent))
     except OSError as error:
         raise StorageError(
-            f"the folder of {out.name} cannot be written ({error.strerror})"
+            f"the folder {out.parent} cannot be written ({error.strerror})"
         ) from error
     try:
         yield staging

@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import partial
 from threading import Lock
 from typing import Any
 
@@ -16,10 +17,13 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metri
 from prometheus_client.multiprocess import MultiProcessCollector
 from prometheus_client.registry import Collector
 from prometheus_client.samples import Sample
+from prometheus_fastapi_instrumentator.metrics import Info
 from prometheus_fastapi_instrumentator.middleware import PrometheusInstrumentatorMiddleware
 
 from app.db.store import Store
 from app.errors import StorageError
+from app.features.jobs.queries import FAILED
+from app.features.jobs.result_sentences import RESULT_KINDS
 from app.features.maintenance.upkeep import HomeReport, read_home_report
 from app.http.deps import Services
 from app.http.event_stream import ListenerCounts
@@ -35,6 +39,8 @@ MULTIPROCESS = "PROMETHEUS_MULTIPROC_DIR"
 """Where web processes count together; unset where there is one."""
 REFRESH_SECONDS = 1.0
 """Between two looks at the numbers that another process may be asked for."""
+METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
+"""Methods that are counted by name; anybody can make up more."""
 _NUMBER = re.compile(r"/[0-9]+(?=/|$)")
 
 
@@ -69,6 +75,9 @@ class RequestMetrics(PrometheusInstrumentatorMiddleware):
     def __init__(self, *arguments: Any, **options: Any):
         super().__init__(*arguments, **options)
         self._routes: dict[tuple[str, str], str] = {}
+        self.instrumentations = [
+            partial(_count_known_method, counting) for counting in self.instrumentations
+        ]
 
     def _get_handler(self, request: Request) -> tuple[str, bool]:
         """The route of a request, or its path where it has none; and whether it has one."""
@@ -87,6 +96,13 @@ class RequestMetrics(PrometheusInstrumentatorMiddleware):
                 self._routes.clear()
             self._routes[address] = route
         return route, found
+
+
+def _count_known_method(counting: Callable[[Info], None], info: Info) -> None:
+    """Count a request; every method that no route has is ``other``."""
+    if info.method not in METHODS:
+        info.method = "other"
+    counting(info)
 
 
 class DatabaseCollector(Collector):
@@ -245,7 +261,10 @@ def _home_metrics(home: HomeReport) -> Iterator[Metric]:
     jobs = GaugeMetricFamily(
         "touchline_jobs", "Jobs on record, by kind and state.", labels=["kind", "state"]
     )
-    for (kind, state), number in sorted(home.jobs.items()):
+    # An alarm on failures needs the number before the first one.
+    counts: dict[tuple[str, str], int] = {(kind, FAILED): 0 for kind in RESULT_KINDS}
+    counts.update(home.jobs)
+    for (kind, state), number in sorted(counts.items()):
         jobs.add_metric([kind, state], number)
     yield jobs
 

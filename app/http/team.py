@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from dataclasses import dataclass
-from ipaddress import ip_address
+from ipaddress import IPv4Network, IPv6Network, ip_address, ip_network
 from typing import Annotated
 from urllib.parse import urlsplit
 
@@ -134,7 +134,7 @@ class TeamLogin:
     passkeys: Passkeys
     sign_on: SignOn | None
     url: str | None
-    proxies: frozenset[str]
+    proxies: tuple[IPv4Network | IPv6Network, ...]
     attempts: AttemptLimits
     devices: DeviceTokens
     mail: MailServer | None
@@ -157,7 +157,7 @@ class TeamLogin:
             Passkeys(store, logins),
             SignOn(store, logins, rules) if rules else None,
             settings.url,
-            frozenset(settings.proxies),
+            tuple(ip_network(text, strict=False) for text in settings.proxies),
             AttemptLimits(store),
             DeviceTokens(store),
             read_mail_server(settings),
@@ -250,9 +250,12 @@ class TeamLogin:
         """Where a request comes from: the last address that a proxy of ours has seen."""
         peer = request.client.host if request.client else ""
         forwarded = request.headers.getlist("x-forwarded-for")
-        if self.url is None or peer not in self.proxies or not forwarded:
+        if self.url is None or not forwarded or not self._is_proxy(peer):
             return peer
         return forwarded[-1].rpartition(",")[2].strip()[:60] or peer
+
+    def _is_proxy(self, peer: str) -> bool:
+        return _is_ip_address(peer) and any(ip_address(peer) in one for one in self.proxies)
 
 
 def _is_ip_address(name: str) -> bool:

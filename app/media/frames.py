@@ -482,7 +482,7 @@ def _forward_result(waiting: Future[Any], done: Future[Any]) -> None:
 
 
 def make_picture_error(name: str, error: WorkerEnded) -> ReviewError:
-    """What the end of a process over a picture says: of the picture, or of the machine."""
+    """The error for a worker that ended on a picture: it blames the picture, or the machine."""
     if error.reason in ("killed", "terminated"):
         more = " Where it happens often, give more memory." if error.reason == "killed" else ""
         return OverloadedError(f"{name} {error}", hint=f"Try again in a moment.{more}")

@@ -125,7 +125,7 @@ def make_search_space_of_known_cameras(known: Sequence[Camera]) -> CameraSearchS
 def find_candidate_cameras(
     pieces: FloatArray, library: CameraSearchSpace, pitch: Pitch, width: float
 ) -> FloatArray:
-    """The cameras of a library that lay a marking on one of the pieces.
+    """The cameras of a library that project a marking onto one of the pieces.
 
     Args:
         pieces: Straight pieces of paint: their two ends relative to the principal point,

@@ -165,7 +165,7 @@ def trace_visible_markings(
 def find_paint(
     reading: PreparedPicture, traced: TracedPlaces, window_px: float | FloatArray
 ) -> DetectedPaint:
-    """Paint across each place, sought up to a distance.
+    """The painted line near each place, searched across the marking up to a distance.
 
     Args:
         window_px: To either side, for all places or for each, shape (N,).

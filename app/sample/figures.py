@@ -12,7 +12,7 @@ import numpy as np
 
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
-from app.sample.fixture import Colour, MatchLook, Outfit
+from app.sample.fixture import Colour, MatchAppearance, Outfit
 from app.sample.play import TEAM, Instant
 from app.sample.props import Image, Patch
 
@@ -193,7 +193,7 @@ def list_people_in_view(
     return people
 
 
-def choose_outfit(look: MatchLook, index: int) -> Outfit:
+def choose_outfit(look: MatchAppearance, index: int) -> Outfit:
     """What person ``index`` of an instant wears."""
     if index == 2 * TEAM:
         return look.referee
@@ -205,7 +205,7 @@ def choose_outfit(look: MatchLook, index: int) -> Outfit:
 def draw_person(
     image: Image,
     person: ProjectedPerson,
-    look: MatchLook,
+    look: MatchAppearance,
     number: int,
     gain: Colour,
     lit_from: float,
@@ -245,7 +245,7 @@ _DISTANT = (
 
 
 def draw_distant_person(
-    image: Image, person: ProjectedPerson, look: MatchLook, gain: Colour
+    image: Image, person: ProjectedPerson, look: MatchAppearance, gain: Colour
 ) -> None:
     """Draw somebody who is too small for more than the colours of the kit.
 

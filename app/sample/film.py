@@ -17,7 +17,7 @@ from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera, rotation_from_pan_tilt_roll
 from app.sample.cameras import CENTER, CORNER_RADIUS, HEIGHT, WIDTH
 from app.sample.figures import draw_distant_person, draw_person, list_people_in_view, pose_people
-from app.sample.fixture import MatchLook
+from app.sample.fixture import MatchAppearance
 from app.sample.play import HALF_LENGTH, Instant
 from app.sample.props import Image, draw_ball, draw_goal_posts, draw_net
 from app.sample.render import (
@@ -119,7 +119,7 @@ def _compute_pixel_directions(
     return np.arctan2(aside, ahead), ray[:, 2] / np.hypot(ray[:, 0], ray[:, 1])
 
 
-def make_backdrop(cameras: Sequence[Camera], look: MatchLook) -> Backdrop:
+def make_backdrop(cameras: Sequence[Camera], look: MatchAppearance) -> Backdrop:
     """The empty stadium as far as cameras of one place see it."""
     across, down = np.linspace(-8, WIDTH + 8, 9), np.linspace(-8, HEIGHT + 8, 7)
     rim = np.array(
@@ -177,7 +177,7 @@ def _make_level_camera(backdrop: Backdrop, camera: Camera, pan: float, width: in
     )
 
 
-def _draw_goal(backdrop: Backdrop, camera: Camera, sign: float, look: MatchLook) -> None:
+def _draw_goal(backdrop: Backdrop, camera: Camera, sign: float, look: MatchAppearance) -> None:
     """Put the goal at x = ``sign`` * 52.5 m onto the cylinder: it is drawn on a plane, where lines are straight."""
     toward = np.array([sign * (HALF_LENGTH + 1.0), 0.0]) - camera.position[:2]
     far, first = float(np.hypot(*toward)), backdrop.pan
@@ -212,7 +212,9 @@ def _draw_goal(backdrop: Backdrop, camera: Camera, sign: float, look: MatchLook)
     cv2.copyTo(np.asarray(cv2.remap(plane, *wanted, cv2.INTER_LINEAR)), there_too, area)
 
 
-def render_picture(backdrop: Backdrop, camera: Camera, instant: Instant, look: MatchLook) -> Image:
+def render_picture(
+    backdrop: Backdrop, camera: Camera, instant: Instant, look: MatchAppearance
+) -> Image:
     """A picture: blue green red, shape (720, 1280, 3), without noise and captions."""
     image = backdrop.render_from(camera)
     people = list_people_in_view(camera, instant, pose_people(instant), image)

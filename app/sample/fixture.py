@@ -87,7 +87,7 @@ class Stands:
 
 
 @dataclass(frozen=True)
-class MatchLook:
+class MatchAppearance:
     """Everything that the frames of one match have in common."""
 
     seed: int
@@ -122,7 +122,7 @@ _KEEPERS = (_LIME, _PINK, _TEAL, _GREY, _ORANGE)
 _REFEREES = (_YELLOW, _BLACK, _TEAL)
 
 
-def make_look(index: int, seed: int, evening: bool) -> MatchLook:
+def make_look(index: int, seed: int, evening: bool) -> MatchAppearance:
     """The look of match ``index``: neighbours differ in kits, grass and light."""
     rng = np.random.default_rng([seed, index, 0x100C])
     home, away = _PAIRS[(index + seed) % len(_PAIRS)]
@@ -130,7 +130,7 @@ def make_look(index: int, seed: int, evening: bool) -> MatchLook:
         _choose_contrasting_colour(_KEEPERS, (home.shirt, away.shirt), skip) for skip in (0, 1)
     ]
     referee = _choose_contrasting_colour(_REFEREES, (home.shirt, away.shirt, *keepers), 0)
-    return MatchLook(
+    return MatchAppearance(
         seed=int(rng.integers(1 << 31)),
         home=home,
         away=away,
@@ -267,7 +267,7 @@ class SampleMatch:
     away: str
     score: tuple[int, int]
     split: str
-    look: MatchLook
+    look: MatchAppearance
 
     @property
     def name(self) -> str:

@@ -23,7 +23,7 @@ from app.sample.figures import (
     list_people_in_view,
     pose_people,
 )
-from app.sample.fixture import Colour, Lamp, Light, MatchLook
+from app.sample.fixture import Colour, Lamp, Light, MatchAppearance
 from app.sample.play import BALL_DIAMETER, HALF_LENGTH, HALF_WIDTH, Instant
 from app.sample.props import draw_ball, draw_goal_posts, draw_net, draw_scoreboard
 from app.sample.scene import Scene
@@ -242,7 +242,7 @@ def render_view(scene: Scene, view_key: str) -> Image:
     return image
 
 
-def _render_empty_stadium(camera: Camera, instant: Instant, look: MatchLook) -> Image:
+def _render_empty_stadium(camera: Camera, instant: Instant, look: MatchAppearance) -> Image:
     image = np.empty((HEIGHT, WIDTH, 3), np.uint8)
     background = np.empty((HEIGHT, WIDTH), np.uint8)
     shadow = make_grass_light_mask(camera, instant, pose_people(instant), look.light, HEIGHT, WIDTH)
@@ -270,13 +270,13 @@ def make_camera_shading_inputs(camera: Camera) -> ShadingCamera:
     return ShadingCamera(camera.rotation, camera.position, *lens)
 
 
-def make_grass_shading_inputs(look: MatchLook) -> ShadingGrass:
+def make_grass_shading_inputs(look: MatchAppearance) -> ShadingGrass:
     """The grass of a match."""
     grass, shadow = look.grass, look.light.shade or (0.0, 0.0, 0.0)
     return ShadingGrass(*grass.colour, grass.across, grass.band, grass.contrast, *shadow)
 
 
-def make_stadium_shading_inputs(camera: Camera, look: MatchLook) -> ShadingStadium:
+def make_stadium_shading_inputs(camera: Camera, look: MatchAppearance) -> ShadingStadium:
     """What stands around the grass, as far as a camera there sees it."""
     stands, light = look.stands, look.light
     atlas, levels = make_board_mipmap(look.seed)
@@ -303,7 +303,7 @@ def make_stadium_shading_inputs(camera: Camera, look: MatchLook) -> ShadingStadi
 
 
 def _draw_people_ball_and_goals(
-    image: Image, camera: Camera, instant: Instant, look: MatchLook
+    image: Image, camera: Camera, instant: Instant, look: MatchAppearance
 ) -> None:
     """Everything that stands on the grass, far things first."""
     side = light_direction_in_image(camera, look)
@@ -321,7 +321,7 @@ def _draw_people_ball_and_goals(
 
 
 def _draw_people_and_ball(
-    image: Image, camera: Camera, instant: Instant, look: MatchLook, side: float
+    image: Image, camera: Camera, instant: Instant, look: MatchAppearance, side: float
 ) -> None:
     """People and the ball, far ones first."""
     people = list_people_in_view(camera, instant, pose_people(instant), image)
@@ -338,7 +338,7 @@ def _draw_people_and_ball(
             draw_person(image, person, look, instant.numbers[person.index], gain, side)
 
 
-def light_direction_in_image(camera: Camera, look: MatchLook) -> float:
+def light_direction_in_image(camera: Camera, look: MatchAppearance) -> float:
     """Which side of the image the light comes from, -1 left to +1 right."""
     if len(look.light.lamps) > 1:
         return 0.3
@@ -347,7 +347,7 @@ def light_direction_in_image(camera: Camera, look: MatchLook) -> float:
     return float(-(camera.rotation[0] @ shift) / max(length, 0.3))
 
 
-def light_gain_at(look: MatchLook, place: FloatArray) -> Colour:
+def light_gain_at(look: MatchAppearance, place: FloatArray) -> Colour:
     """Light on somebody who stands there, per channel."""
     b, g, r = look.light.exposure
     if look.light.shade is None:

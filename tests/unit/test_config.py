@@ -137,3 +137,21 @@ class TestIsLocal:
     )
     def test_everything_else_is_reached_by_others(self, host: str) -> None:
         assert not is_local(host)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("PROXIES", '["proxy.example.org"]', "is not an address such as 10.0.0.7"),
+        ("ALLOWED_HOSTS", '["https://x.example"]', "is not a host name"),
+        ("ALLOWED_HOSTS", '["localhost:8820"]', "is not a host name"),
+        ("IMPORT_FOLDERS", "[bad", "is not JSON; write it as"),
+    ],
+)
+def test_a_value_that_can_never_match_is_refused_with_its_setting(
+    name: str, value: str, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(f"TOUCHLINE_{name}", value)
+    with pytest.raises(typer.BadParameter, match=said) as refused:
+        read_settings()
+    assert f"(TOUCHLINE_{name})" in refused.value.message

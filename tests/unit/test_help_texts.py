@@ -33,7 +33,7 @@ PLAIN_WORDS = """
     datasets day delete deps descriptions details detect devices diagram dialect dialog diff
     differences dismissals distance documents drags drawing durable editor empty enrol equations
     errors estimates estimator evaluate event events executors expected export exports facets facts faults
-    fields figure figures files film filter finder first fit fixture follow followed form format formats
+    fields figure figures files film filter finder first fit fixture folder follow followed form format formats
     frozen gestures glossary gold grass grid guess guide guideline guidelines header headers
     heat help histograms history hit home hooks idempotency identity if image images import imports
     index indexing init insert insight invitation invitations invite items jaccard join json kept

@@ -168,7 +168,11 @@ class TestTls:
 
 class TestReadMailServer:
     def test_without_a_host_there_is_none(self, tmp_path: Path) -> None:
-        assert read_mail_server(settings(tmp_path, smtp_host=None)) is None
+        assert read_mail_server(settings(tmp_path, smtp_host=None, smtp_from=None)) is None
+
+    def test_a_sender_without_a_host_is_refused(self, tmp_path: Path) -> None:
+        with pytest.raises(InputError, match="without TOUCHLINE_SMTP_HOST"):
+            read_mail_server(settings(tmp_path, smtp_host=None))
 
     @pytest.mark.parametrize(("security", "port"), [("starttls", 587), ("tls", 465), ("none", 25)])
     def test_each_kind_of_connection_has_its_port(

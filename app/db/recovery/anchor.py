@@ -31,8 +31,8 @@ AGAIN_SECONDS = 0.01
 """A reader beside a writer may see half of an anchor: after so long it is read once more."""
 RESTORE = "Run touchline restore BACKUP, or touchline restore {file} to continue with the content of that file."
 RESTORE_SERVER = (
-    "Restore it with pg_restore, or let TOUCHLINE_DATABASE_URL name the database of this home. If"
-    " it is the right one, move home.json away."
+    "After pg_restore of an older dump this is expected: move home.json away and start again."
+    " Otherwise restore the newest dump, or let TOUCHLINE_DATABASE_URL name the database of this home."
 )
 
 

@@ -136,7 +136,7 @@ def adjudicate_case(
     Raises:
         NotFoundError: Nothing of the group waits for a decision, or it is no such annotation.
         ForbiddenError: It is one's own, and others could decide.
-        ConflictError: Somebody was faster.
+        ConflictError: It was changed meanwhile.
     """
     case = read_case(store, group_id, actor=actor)
     if case.refused is not None:

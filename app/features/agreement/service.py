@@ -328,7 +328,7 @@ def adopt_and_decide(
         found: What the comparison came to, where it is not kept yet.
 
     Raises:
-        ConflictError: Somebody was faster, or one of the annotations was returned meanwhile.
+        ConflictError: It was changed meanwhile, or one of the annotations was returned meanwhile.
     """
     at = now()
     itself = actor == BY_ITSELF

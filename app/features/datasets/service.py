@@ -41,10 +41,11 @@ from app.json_text import quote_text
 from app.sample.fixture import LEAGUES
 from app.soccer.codec import policy_to_json
 from app.soccer.policy import Policy
+from app.wording import is_one_line
 
 
 class HasMatch(Protocol):
-    """Something that is known of one match."""
+    """Anything that has the name of its match."""
 
     @property
     def match(self) -> str:
@@ -114,12 +115,16 @@ def strip_and_check_title(text: str, what: str) -> str:
         what: What is called so, such as ``a batch``.
 
     Raises:
-        InputError: It is empty, too long, or holds what cannot be printed.
+        InputError: It is empty, too long, or holds control characters.
     """
     text = text.strip()
-    if not text or len(text) > MAX_TITLE or not text.isprintable():
+    if not text or len(text) > MAX_TITLE:
         raise InputError(
             f"the name of {what} must have 1 to {MAX_TITLE} characters", pointer="/name"
+        )
+    if not is_one_line(text):
+        raise InputError(
+            f"the name of {what} must be one line without control characters", pointer="/name"
         )
     return text
 

@@ -24,7 +24,7 @@ from app.features.file_tools.matches import (
     read_match_of_each_frame,
     require_named_frame,
 )
-from app.features.file_tools.out_files import require_writable_folder
+from app.features.file_tools.output_folder import require_writable_folder
 from app.formats.cameras import camera_file_name, format_camera_file, read_cameras
 from app.formats.frame_names import compose_name, strip_image_suffix
 from app.formats.json_reader import read_json

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from app.errors import DatasetFormatError, InputError
-from app.features.file_tools.out_files import require_writable_folder, write_out_file
+from app.features.file_tools.output_folder import require_writable_folder, write_out_file
 from app.formats.camera_matrix import cameras_to_arrays
 from app.formats.cameras import read_cameras
 from app.formats.opentrackio_writer import (

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from app.errors import DatasetFormatError, GeometryError, InputError
-from app.features.file_tools.out_files import write_out_file
+from app.features.file_tools.output_folder import write_out_file
 from app.features.file_tools.track import pitch_to_row
 from app.formats.cameras import camera_file_name, format_camera_file
 from app.formats.csv_text import read_rows

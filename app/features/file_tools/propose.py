@@ -14,7 +14,7 @@ import numpy as np
 from app.config import Settings
 from app.errors import GeometryError, InputError
 from app.features.file_tools.matches import SnappedFrame, refine_shared_tripod_cameras
-from app.features.file_tools.out_files import require_writable_folder, write_out_file
+from app.features.file_tools.output_folder import require_writable_folder, write_out_file
 from app.features.file_tools.paint import PictureFile, UniqueNameGenerator, read_pictures
 from app.formats.cameras import camera_file_name, format_camera_file, read_cameras
 from app.formats.report import ReaderReport

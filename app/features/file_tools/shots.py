@@ -16,7 +16,7 @@ import numpy as np
 from app.config import Settings
 from app.errors import DatasetFormatError, ImageError, InputError, TooLargeError
 from app.features.file_tools.camera_export import key_by_frame_number
-from app.features.file_tools.out_files import require_writable_folder, write_out_file
+from app.features.file_tools.output_folder import require_writable_folder, write_out_file
 from app.formats.cameras import read_cameras
 from app.formats.csv_text import is_missing, read_rows
 from app.formats.file_tree import DEFAULT_LIMITS

@@ -13,7 +13,7 @@ import numpy as np
 
 from app.durable import replace_file
 from app.errors import InputError, UnsafePathError
-from app.features.file_tools.out_files import require_writable_folder
+from app.features.file_tools.output_folder import require_writable_folder
 from app.formats.cameras import camera_file_name, format_camera_file
 from app.formats.report import ReaderReport
 from app.formats.sn_calibration import read_line_documents

@@ -173,7 +173,7 @@ def submit_edit(
         how: See ``EditOptions``.
 
     Raises:
-        StaleRevisionError: Somebody else was faster.
+        StaleRevisionError: It was changed meanwhile.
         SharedStationError: The edit belongs to a static camera.
         InputError, NotFoundError: The edit does not fit the group.
         StorageError: Nothing was saved.
@@ -350,7 +350,7 @@ def submit_change(
         if_match, actor, then, paint, solve: See ``EditOptions``.
 
     Raises:
-        StaleRevisionError: Somebody else was faster.
+        StaleRevisionError: It was changed meanwhile.
         ReviewError: As ``find`` and ``plan`` raise it.
         StorageError: Nothing was saved.
     """

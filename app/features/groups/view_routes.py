@@ -245,7 +245,7 @@ async def _find_neighbour_frame_media(
 def _find_frame_at_offset(view: ViewLocation, around: dict[int, Media], offset: int) -> Media:
     """The frame so many frames later."""
     if not around:
-        raise NotFoundError(f"view {view.key}: {NO_NEIGHBOURS}")
+        raise NotFoundError(f"there are no frames before or after view {view.key}")
     if offset not in around:
         raise NotFoundError(f"view {view.key}: there is no frame {describe_frame_offset(offset)}")
     return around[offset]

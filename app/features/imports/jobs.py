@@ -131,7 +131,7 @@ def request_import(
 
 
 def resume_imports(jobs: Jobs, store: Store, settings: Settings) -> None:
-    """Let imports that an earlier server was at go on; what is there already stays as it is."""
+    """Continue imports that an earlier server began; what is imported stays as it is."""
 
     jobs.register_resume(KIND, partial(run_import_job, jobs, store, settings))
 

@@ -54,7 +54,7 @@ class CopyDataset(NamedTuple):
 
 
 class GoldHead(NamedTuple):
-    """A gold group without what is true of it."""
+    """A gold group without its known truth."""
 
     group_id: int
     dataset_id: int

@@ -56,6 +56,7 @@ from app.features.people.provider import Provider
 from app.features.people.sign_on_rules import count_active_admins_linked_to_sign_on, read_rules
 from app.features.queue.refresh_queries import find_outdated_rows
 from app.features.solutions.service import list_stale_groups
+from app.features.webhooks.sender import require_valid_setting
 from app.features.what_if.service import examine_yield_cache
 from app.mail import read_mail_server
 from app.object_store.store import ChangedObjectError, ObjectStore, open_store
@@ -300,7 +301,7 @@ def examine_home_without_database(settings: Settings) -> list[CheckResult]:
 
 def examine_admins_clock_and_leftovers(store: Store) -> list[CheckResult]:
     """What lies around the tables of a database that can be opened."""
-    settings, admins = store.settings, _check_linked_admins(store)
+    settings, admins = store.settings, _check_admins_can_log_in(store)
     with store.read() as session:
         return [
             *([admins] if admins else []),
@@ -319,11 +320,15 @@ def _check_settings(settings: Settings) -> CheckResult:
     if unknown:
         sentence = f"{', '.join(unknown)} is not a setting and is ignored"
         return CheckResult(
-            "settings", False, sentence, "app/config.py lists all; correct or unset it."
+            "settings", False, sentence, "docs/settings.md lists all; correct or unset it."
         )
     if gone:
         sentence = f"TOUCHLINE_IMPORT_FOLDERS names {', '.join(gone)}, which is not a folder"
         return CheckResult("settings", False, sentence, "Make the folder, or take it out.")
+    try:
+        require_valid_setting(settings)
+    except InputError as error:
+        return CheckResult("settings", False, error.message, error.hint)
     return CheckResult("settings", True, f"home {settings.home}")
 
 
@@ -361,7 +366,7 @@ def _check_mail(settings: Settings) -> CheckResult:
     return CheckResult("mail", True, found)
 
 
-def _check_linked_admins(store: Store) -> CheckResult | None:
+def _check_admins_can_log_in(store: Store) -> CheckResult | None:
     """Whether an admin can come in where there is no other way; None: there is one."""
     try:
         rules = read_rules(store.settings.model_copy(update={"team": True}))

@@ -179,3 +179,5 @@ _ENDINGS: Mapping[str, Callable[[Json], str]] = {
     "link": _describe_link,
 }
 """By the kind of the job."""
+RESULT_KINDS = tuple(_ENDINGS)
+"""Kinds of jobs whose result has a sentence."""

@@ -14,6 +14,7 @@ from app.errors import InputError
 from app.features.audit.service import add_audit_event
 from app.features.people.queries import read_team_setting, write_team_setting
 from app.json_text import Moment, json_text
+from app.wording import is_one_line
 
 _BANNER = "maintenance"
 """Name of the setting."""
@@ -58,8 +59,10 @@ def set_banner(
             begins.
     """
     text = text.strip()
-    if not text or len(text) > LONGEST or not text.isprintable():
-        raise InputError(f"a notice is one line of 1 to {LONGEST} characters", pointer="/text")
+    if not text or len(text) > LONGEST:
+        raise InputError(f"a notice must have 1 to {LONGEST} characters", pointer="/text")
+    if not is_one_line(text):
+        raise InputError("a notice must be one line without control characters", pointer="/text")
     at = datetime.now(UTC)
     if until is not None and until <= max(starts or at, at):
         raise InputError(

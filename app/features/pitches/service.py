@@ -187,7 +187,7 @@ def change_pitches(
 
     Raises:
         NotFoundError: There is no such dataset or match.
-        StaleRevisionError: Somebody else was faster.
+        StaleRevisionError: It was changed meanwhile.
     """
     state = _read_pitches(session, dataset)
     if if_match is not None:

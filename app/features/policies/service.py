@@ -94,7 +94,7 @@ def change_policy(
 
     Raises:
         NotFoundError: There is no such dataset.
-        StaleRevisionError: Somebody else was faster.
+        StaleRevisionError: It was changed meanwhile.
     """
     with store.write() as session:
         return apply_policy(session, dataset, policy, if_match=if_match, actor=actor)

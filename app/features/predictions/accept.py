@@ -235,7 +235,7 @@ def _require_no_other_ball(state: GroupState, edit: SetBalls, if_match: str) -> 
         return
     raise ConflictError(
         f"view {edit.view} has a ball already",
-        hint="Delete that ball first, or ask for replace=true.",
+        hint="Delete that ball first, or send replace=true.",
     )
 
 

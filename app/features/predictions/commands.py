@@ -417,7 +417,7 @@ def evaluate(
     """
     if predictions is None and reference is None and cameras is None:
         raise typer.BadParameter("name predictions, --cameras or --reference")
-    from app.features.file_tools.out_files import require_writable_folder
+    from app.features.file_tools.output_folder import require_writable_folder
     from app.features.predictions.evaluation_run import EvaluationRequest, SourcesEvaluationRequest
     from app.features.predictions.reader import PredictionFiles
 

@@ -363,7 +363,7 @@ def evaluate_stored_tracks(
     if not values:
         where = f'the version "{version.name}"' if version else f'"{dataset.name}"'
         raise InputError(
-            f"{where} has no track of the ball that a person accepted",
+            f"{where} has no accepted ball track",
             hint="Make and accept its tracks, then freeze a version.",
             pointer="/version",
         )

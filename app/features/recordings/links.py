@@ -51,7 +51,7 @@ MAX_LINKS = 10_000
 
 
 def list_links(store: Store, recording_id: int) -> list[ShotLink]:
-    """The links of a recording, in which it has the live shot or the replay.
+    """The links whose live shot or replay lies in a recording.
 
     Raises:
         NotFoundError: There is no such recording.
@@ -200,7 +200,7 @@ def set_instants(
         ConflictError: An index is gone, or of an older version.
         InputError: An instant is outside of its shot, or a frame of the replay has two.
         NotFoundError: The recording has no such link.
-        StaleRevisionError: Somebody else was faster.
+        StaleRevisionError: It was changed meanwhile.
     """
     with store.read() as session:
         seen = require_link(session, recording_id, link_id)

@@ -118,7 +118,7 @@ def replace_shots(
 
     Raises:
         InputError: Shots overlap, are out of order, or are outside of the recording.
-        StaleRevisionError: Somebody else was faster.
+        StaleRevisionError: It was changed meanwhile.
     """
     with store.write() as session:
         row = require_recording(session, recording_id)

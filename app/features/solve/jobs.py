@@ -222,7 +222,7 @@ def request_policy_change(
     """Judge a dataset by another policy, and solve what that leaves stale, soon.
 
     Raises:
-        StaleRevisionError: Somebody else was faster.
+        StaleRevisionError: It was changed meanwhile.
     """
 
     def apply_policy_change(session: Session, job: Job) -> PolicyStateAndJob:
@@ -245,7 +245,7 @@ def request_pitch_change(
 
     Raises:
         NotFoundError: There is no such match.
-        StaleRevisionError: Somebody else was faster.
+        StaleRevisionError: It was changed meanwhile.
     """
 
     def apply_pitch_change(session: Session, job: Job) -> PitchesAndJob:

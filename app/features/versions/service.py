@@ -152,7 +152,7 @@ def find_version_id(store: Store, version: str, dataset: str | None = None) -> i
     if len(fitting) > 1:
         names = ", ".join(dict.fromkeys(item.dataset for item in fitting))
         raise InputError(
-            f"several versions are called {quote_text(version)} (of {names})",
+            f"several datasets have a version {quote_text(version)}: {names}",
             hint="Name it by its id, or name its dataset, too: ?dataset=NAME.",
             pointer="/version",
         )

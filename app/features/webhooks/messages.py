@@ -21,7 +21,11 @@ from app.db.json_columns import Json
 from app.db.session import Session
 from app.features.jobs.queries import DONE, FAILED
 from app.features.webhooks import queries as webhook_outbox
-from app.features.webhooks.queries import list_jobs_ended_since, list_log_entries_since
+from app.features.webhooks.queries import (
+    list_jobs_ended_since,
+    list_log_entries_since,
+    make_time_suffix,
+)
 from app.json_text import canonical_json_text
 
 
@@ -127,7 +131,7 @@ def _make_log_messages(
             ],
         }
         yield WebhookMessage(
-            f"msg_{webhook_id}_log{first}-{last}",
+            f"msg_{webhook_id}_log{first}-{last}_{make_time_suffix(found[-1].at)}",
             kind,
             _message_body(kind, found[-1].at, data),
             log_id=last,
@@ -145,7 +149,7 @@ def _make_job_messages(
             "job": {"id": row.id, "kind": row.kind, "title": row.title, "state": row.state},
         }
         body = _message_body(kind, row.ended, data)
-        name = f"msg_{webhook_id}_job{row.id}"
+        name = f"msg_{webhook_id}_job{row.id}_{make_time_suffix(row.ended)}"
         yield WebhookMessage(name, kind, body, ended=row.ended, job_id=row.id)
 
 

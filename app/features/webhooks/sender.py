@@ -86,6 +86,15 @@ def parse_address(text: str, pointer: str | None = None) -> WebhookAddress:
     return WebhookAddress(parts.scheme, host, port or _PORTS[parts.scheme], parts.path or "/")
 
 
+def require_valid_setting(settings: Settings) -> None:
+    """Raise InputError unless TOUCHLINE_WEBHOOKS lists addresses that messages can be sent to."""
+    for item in settings.webhooks:
+        try:
+            parse_address(item)
+        except InputError as error:
+            raise InputError(f"TOUCHLINE_WEBHOOKS: {error.message}", hint=error.hint) from None
+
+
 def require_allowed_address(text: str, allowed: Iterable[str], pointer: str | None = None) -> None:
     """Raise unless the operator lets the server send to an address.
 

@@ -235,6 +235,21 @@ def test_requests_count_for_their_route_whatever_number_is_in_their_address(
     )
 
 
+def test_methods_that_somebody_made_up_are_one_series(api: TestClient, read) -> None:
+    api.request("MADE", "/groups")
+    before = read("http_requests_total", handler="/groups", method="other", status="4xx")
+    for number in range(5):
+        api.request(f"MADE{number}", "/groups")
+    names = {line for line in api.get("/metrics").text.splitlines() if "MADE" in line}
+    assert names == set()
+    after = read("http_requests_total", handler="/groups", method="other", status="4xx")
+    assert after - before == 5
+
+
+def test_kinds_of_jobs_begin_with_no_failure(read) -> None:
+    assert read("touchline_jobs", kind="export", state="failed") == 0
+
+
 def test_only_addresses_that_come_to_an_end_are_remembered(api: TestClient) -> None:
     counting = metrics.RequestMetrics(api.app, registry=CollectorRegistry())
 

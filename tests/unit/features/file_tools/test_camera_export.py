@@ -121,7 +121,7 @@ class TestOut:
         def refuse(*_arguments: object, **_options: object) -> None:
             raise PermissionError(errno.EACCES, "Permission denied", "/out/.a.npz.1234.partial")
 
-        monkeypatch.setattr("app.features.file_tools.out_files.replace_file", refuse)
+        monkeypatch.setattr("app.features.file_tools.output_folder.replace_file", refuse)
         with pytest.raises(InputError, match=r"a\.npz cannot be written \(Permission denied\)"):
             export_cameras(folder_of(tmp_path / "cameras"), tmp_path / "a.npz", "npz")
 

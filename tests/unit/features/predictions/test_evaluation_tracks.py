@@ -93,7 +93,7 @@ class TestEvaluation:
         add_flight(store)
         path = tmp_path / "ball.csv"
         path.write_text("frame,x_m,y_m,z_m\n101,0,0,-1\n")
-        with pytest.raises(InputError, match='"flight" has no track of the ball that a person'):
+        with pytest.raises(InputError, match='"flight" has no accepted ball track'):
             evaluated(store, path, None)
 
     @pytest.mark.parametrize("asked", [{"split": "test"}, {"boxes": "exact"}, {"min_score": 0.5}])

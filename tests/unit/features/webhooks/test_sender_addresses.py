@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from app.config import Settings
 from app.errors import ConflictError, InputError
-from app.features.webhooks.sender import require_allowed_address
+from app.features.webhooks.sender import require_allowed_address, require_valid_setting
 
 ALLOWED = ["https://hooks.example.org/touchline", "http://127.0.0.1:9000"]
 
@@ -65,3 +66,12 @@ def test_where_the_operator_allows_none_the_setting_is_named() -> None:
     with pytest.raises(ConflictError, match="not allowed to send webhooks") as refused:
         require_allowed_address(ALLOWED[0], [])
     assert "TOUCHLINE_WEBHOOKS" in (refused.value.hint or "")
+
+
+@pytest.mark.parametrize("wrong", ["hooks.example.org", "ftp://hooks.example.org"])
+def test_a_wrong_address_in_the_setting_is_refused_before_anything_is_sent(
+    wrong: str, settings: Settings
+) -> None:
+    with pytest.raises(InputError, match=r"^TOUCHLINE_WEBHOOKS: "):
+        require_valid_setting(settings.model_copy(update={"webhooks": [ALLOWED[0], wrong]}))
+    require_valid_setting(settings.model_copy(update={"webhooks": [ALLOWED[0]]}))
