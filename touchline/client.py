@@ -8,11 +8,12 @@ from functools import partial
 from json import dumps
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote, urlsplit
+from urllib.parse import parse_qsl, quote, urlsplit
 from uuid import uuid4
 
 from touchline.bulk_edits import merged, placed, refusal, requests_of
 from touchline.errors import (
+    DataError,
     JobError,
     NotFoundError,
     RequestError,
@@ -51,6 +52,9 @@ class Client:
         headers: Sent with every request, for example what a proxy asks for.
         timeout: Seconds that one request may take.
         patience: Seconds for which a request is tried again; 0: once.
+
+    Raises:
+        DataError: The address begins with neither http:// nor https://.
     """
 
     def __init__(
@@ -61,6 +65,11 @@ class Client:
         timeout: float = 60.0,
         patience: float = PATIENCE,
     ):
+        if not address.startswith(("http://", "https://")):
+            raise DataError(
+                f'"{address}" is not the address of a server',
+                f"Write it with its scheme: {ADDRESS}",
+            )
         self.address, self._patience = address.rstrip("/").removesuffix("/api/v1"), patience
         self._again = partial(Client, headers=headers, timeout=timeout, patience=patience)
         self._httpx = package("httpx")
@@ -170,7 +179,7 @@ class Client:
 
     def edit_views(
         self,
-        dataset: str,
+        dataset: str | int,
         items: Iterable[Mapping[str, Any]],
         *,
         dry_run: bool = False,
@@ -198,7 +207,7 @@ class Client:
                 done before.
         """
         report: dict[str, Any] = {"dry_run": dry_run, "items": []}
-        path = f"datasets/{quote(dataset, safe='')}/edits"
+        path = f"datasets/{quote(str(dataset), safe='')}/edits"
         params = {"dry_run": "true" if dry_run else None}
         for chunk in requests_of([*items]):
             body: dict[str, Any] = {"items": [item for _, item in chunk]}
@@ -326,8 +335,8 @@ class Client:
 
         Args:
             method: ``GET``, ``POST`` ...
-            path: Below ``/api/v1/``, or an address that a document named.
-            params: Of the query; None leaves one out.
+            path: Below ``/api/v1/``, or an address that a document named; it may have a query.
+            params: More of the query, in place of what the path says; None leaves one out.
             json: The body; None sends none.
             always: Send ``null`` for a body that is None.
             content: A file, or bytes, to send instead.
@@ -350,6 +359,11 @@ class Client:
             sent.setdefault("Content-Type", "application/json")
             body = {"content": dumps(json, allow_nan=False).encode()}
         query = {name: value for name, value in (params or {}).items() if value is not None}
+        # httpx drops the query of an address for which it is given parameters, even none.
+        path, _, asked = path.partition("?")
+        for name, value in parse_qsl(asked, keep_blank_values=True):
+            if name not in (params or {}):
+                query[name] = [*query.get(name, ()), value]
 
         def ask() -> Any:
             url, more = self._url(path), {"params": query, "headers": sent}

@@ -15,11 +15,11 @@ from touchline.frames import ExportFrames, FileFrames, Frames, ServerFrames
 
 
 def open_version(
-    source: str | Path,
+    source: str | Path | Client,
     version: str | None = None,
     *,
     dataset: str | None = None,
-    frames: str | Path | None = None,
+    frames: str | Path | Client | None = None,
     boxes: str = "optimized",
     images: bool = False,
     cache: str | Path | None = None,
@@ -27,11 +27,12 @@ def open_version(
     """A frozen version, from a Parquet export or from a server.
 
     Args:
-        source: Folder or zip of ``touchline export --format parquet``, or address of a server.
+        source: Folder or zip of ``touchline export --format parquet``, or address of a server; of a
+            team's server a ``Client`` with a token.
         version: Its name, or eight or more digits of its hash; default: what the export holds,
             the newest of a server. Any other than that is refused.
         dataset: Name, for a server that has several.
-        frames: Folder or zip with the frames, or address of a server. Default: those in the
+        frames: Folder or zip with the frames, or a server as for ``source``. Default: those in the
             export (``--images copy``), or of the server that the version is from.
         boxes: Which ball box a server exports: ``optimized``, ``annotated`` or ``exact``.
         images: Whether a server exports the frames along, to keep them in the cache.
@@ -42,11 +43,11 @@ def open_version(
         HashError: It is another version, or its content is not what its hash says.
         ServerError: The server refused, or was not there.
     """
-    if not _is_address(source):
-        export = Export(Path(source))
+    client = _place(source)
+    if isinstance(client, Path):
+        export = Export(client)
         export.require(version)
         return Dataset(export, _frames(frames, export, None))
-    client = Client(str(source))
     found = _find(client, dataset, version)
     path = cached_version(Path(cache or cache_folder()), found, boxes, images)
     if not path.exists():
@@ -64,15 +65,22 @@ def open_version(
         ) from error
 
 
-def _is_address(source: str | Path) -> bool:
-    return isinstance(source, str) and source.startswith(("http://", "https://"))
+def _place(source: str | Path | Client) -> Path | Client:
+    """The file, folder or server that is meant."""
+    if isinstance(source, Client):
+        return source
+    is_address = isinstance(source, str) and source.startswith(("http://", "https://"))
+    return Client(str(source)) if is_address else Path(source)
 
 
-def _frames(said: str | Path | None, export: Export, server: tuple[Client, str] | None) -> Frames:
-    if said is not None and _is_address(said):
-        return ServerFrames(Client(str(said)), str(export.manifest["dataset"]), export.manifest)
+def _frames(
+    said: str | Path | Client | None, export: Export, server: tuple[Client, str] | None
+) -> Frames:
     if said is not None:
-        return FileFrames(Path(said))
+        place = _place(said)
+        if isinstance(place, Path):
+            return FileFrames(place)
+        return ServerFrames(place, str(export.manifest["dataset"]), export.manifest)
     if server is not None and not export.has_frames:
         return ServerFrames(*server, export.manifest)
     return ExportFrames(export)
@@ -92,6 +100,7 @@ def _find(client: Client, dataset: str | None, version: str | None) -> Mapping[s
         )
     if version is None:
         return found[0]
+    version = str(version)
     fitting = [item for item in found if version == item["name"]] or [
         item for item in found if len(version) >= 8 and item["hash"].startswith(version)
     ]

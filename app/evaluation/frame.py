@@ -243,7 +243,7 @@ class FrameNameIndex:
     def explain_unknown_name(self, name: str) -> str:
         """Why ``find`` found nothing, in words."""
         if self._find_frame_id(name) == _SEVERAL:
-            return "fits several frames of the dataset; name its match, too"
+            return "fits several frames of the dataset; name its match or group, too, as MATCH/GROUP/VIEW"
         if _strip_suffix(name).rsplit("/", 1)[-1] in self._index:
             return "is not a frame of the dataset: its folders name none of the matches"
         return "is not a frame of the dataset"

@@ -74,7 +74,8 @@ def set_current_server(url: str | None, token_file: Path | None, command: str | 
     parts = urlsplit(url)
     if parts.scheme not in ("http", "https") or not parts.hostname or parts.username:
         raise InputError(
-            f"{url} is not the address of a server", hint="Write the address as https://NAME."
+            f"{url} is not the address of a server",
+            hint="Write the address as https://NAME, or http://localhost:PORT on this machine.",
         )
     if parts.scheme == "http" and not is_local(parts.hostname):
         raise InputError(
@@ -198,6 +199,10 @@ def _translate_client_error(server: ServerPlace, error: Exception) -> ReviewErro
     """The same as an error of a command: what the server said, or why it said nothing."""
     message, hint = getattr(error, "message", str(error)), getattr(error, "hint", None)
     said_nothing = getattr(error, "status", None) == 0
+    if said_nothing and "WRONG_VERSION_NUMBER" in message:
+        return InputError(
+            f"{server.url} answers without TLS", hint="Write the address as http://NAME."
+        )
     if said_nothing and ("certificate" in message.lower() or "ssl" in message.lower()):
         return InputError(
             f"{server.url} has a TLS certificate that cannot be verified: {message}",

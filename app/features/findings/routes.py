@@ -18,7 +18,7 @@ from app.soccer.finding import FINDING_KINDS
 router = APIRouter(prefix="/findings", tags=["findings"], route_class=Route)
 
 FindingKind = Literal[FINDING_KINDS]  # type: ignore[valid-type]
-MAX_GROUPS = 200
+MAX_GROUPS = 500
 
 
 @router.get("")

@@ -38,6 +38,7 @@ from app.geometry.arrays import FloatArray
 from app.media.files import decode_frame
 from app.progress import ReportProgress
 from app.soccer.frames import Box, ImageSize, box_from_corner_origin
+from app.wording import plural
 
 GRAY = 114
 """What Ultralytics fills the border with."""
@@ -154,7 +155,9 @@ def _decode_candidate_boxes(output: FloatArray, category: int) -> tuple[FloatArr
             f"the model's output has the shape {output.shape}, not (1, 4 + classes, N)"
         )
     rows = output[0]
-    if rows.shape[1] == 6 and rows.shape[0] > 6:
+    # Raw output has 4 + classes rows; with the suppression inside it has 6 columns. Both at once
+    # fit only a raw output of six candidates, which no detector has.
+    if rows.shape[1] == 6:
         return rows[:, :4], np.where(rows[:, 5] == category, rows[:, 4], -1.0)
     if rows.shape[0] < 5 + category:
         raise InputError(
@@ -217,6 +220,11 @@ class OnnxModel:
                 f"it is not clear from their names which of the {len(names)} classes of"
                 f" {path.name} is the ball",
                 hint="Name the class of the ball with --category.",
+                pointer="/category",
+            )
+        if names and category is not None and category >= len(names):
+            raise InputError(
+                f"{path.name} has {plural(len(names), 'class', 'classes')}, so the ball cannot be class {category}",
                 pointer="/category",
             )
         return OnnxModel(
@@ -293,6 +301,12 @@ def _find_input_size(path: Path, shape: list[Any], text: str, side: int | None) 
             f"{path.name} is not an image detector: its input has the shape {shape}, not (1, 3, H, W)"
         )
     height, width = (item if isinstance(item, int) and item > 0 else None for item in shape[2:])
+    if side and height is not None and width is not None:
+        raise InputError(
+            f"{path.name} needs pictures of {width} x {height} pixels, so --side has no effect",
+            hint="Leave --side out.",
+            pointer="/side",
+        )
     if height is None or width is None:
         sides = [int(part) for part in text.strip("[]() ").split(",") if part.strip().isdigit()]
         chosen = [side, side] if side else (sides * 2)[:2] or [DEFAULT_SIDE, DEFAULT_SIDE]

@@ -476,6 +476,9 @@ def read_or_find_prediction_set(
     """
     if source.path is not None and not source.path.exists():
         if source.cameras is not None:
-            raise NotFoundError(f"there is no file {source.path}")
+            raise NotFoundError(
+                f"there is no file {source.path}",
+                hint="--cameras needs a file of boxes beside it, not the name of a set.",
+            )
         return find_predictions(store, dataset, str(source.path), or_file=True)
     return add_predictions(store, dataset, None, source, actor=actor)

@@ -11,6 +11,7 @@ import pytest
 from touchline.client import Client
 from touchline.errors import (
     BusyError,
+    DataError,
     FullError,
     JobError,
     NotFoundError,
@@ -110,6 +111,23 @@ class TestRequests:
         assert Client(answers.address).upload(file) == "abc"
         assert [item.body for item in answers.asked] == [b"image,x\n" * 3] * 2
         assert answers.asked[1].headers["Content-Type"] == "application/octet-stream"
+
+    def test_the_query_of_a_path_is_sent(self, answers) -> None:
+        answers.say(200, {})
+        client = Client(answers.address)
+        client.delete("datasets/one?dry_run=true", {"confirm": "one"})
+        client.get("groups?dataset=a%20b&limit=3", limit=5, cursor=None)
+        client.send("GET", f"{answers.address}/api/v1/groups?id=1&id=2")
+        assert [item.path for item in answers.asked] == [
+            "/api/v1/datasets/one?dry_run=true",
+            "/api/v1/groups?limit=5&dataset=a+b",
+            "/api/v1/groups?id=1&id=2",
+        ]
+
+    @pytest.mark.parametrize("address", ["127.0.0.1:8000", "ftp://x", ""])
+    def test_an_address_without_scheme_is_refused_at_once(self, address: str) -> None:
+        with pytest.raises(DataError, match="is not the address of a server"):
+            Client(address)
 
     def test_an_address_elsewhere_is_not_followed(self, answers) -> None:
         with pytest.raises(NotFoundError, match="another server"):

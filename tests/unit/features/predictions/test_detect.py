@@ -68,8 +68,9 @@ class TestDecode:
         found = decode_output(output(*many), BOX, 0, 0.1, 3)
         assert [round(item.score, 2) for item in found] == [0.58, 0.57, 0.56]
 
-    def test_reads_an_export_that_suppresses_itself(self) -> None:
-        rows = np.zeros((1, 300, 6), np.float32)
+    @pytest.mark.parametrize("most", [300, 5, 2])
+    def test_reads_an_export_that_suppresses_itself(self, most: int) -> None:
+        rows = np.zeros((1, most, 6), np.float32)
         rows[0, 0] = [317, 316, 323, 324, 0.8, 0]
         rows[0, 1] = [100, 300, 106, 306, 0.7, 2]
         (found,) = decode_output(rows, BOX, 0, 0.25, 20)
