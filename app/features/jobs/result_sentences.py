@@ -84,6 +84,9 @@ def _describe_acceptance(result: Json) -> str:
 
 
 def _describe_practice(result: Json) -> str:
+    if "recording" in result:
+        made = "The practice recording"
+        return f"{made} is made." if result["made"] else f"{made} already exists."
     groups = plural(result["groups"], "practice group")
     return f"{groups} made." if result["made"] else f"The {groups} already exist."
 

@@ -37,7 +37,12 @@ from app.features.recordings.camera_tracking import (
 from app.features.recordings.cameras import read_cameras_of_frames
 from app.features.recordings.index import Send, index_recording_in_worker, run_in_worker
 from app.features.recordings.links import list_links
-from app.features.recordings.service import Recording, add_recording, list_recordings
+from app.features.recordings.service import (
+    Recording,
+    add_recording,
+    list_recordings,
+    require_recording,
+)
 from app.features.recordings.shots import Shot, get_shots, replace_shots
 from app.progress import ReportProgress, make_partial_progress
 from app.sample import SEED
@@ -61,11 +66,11 @@ LOST = (0.4, 0.6)
 
 @dataclass(frozen=True)
 class RecordingPractice:
-    """The practice recording; no lessons until it is made.
+    """The practice recording; no lessons until it is made to its end.
 
     Attributes:
         dataset: Name of the dataset.
-        recording: Id of the recording; None until it is made.
+        recording: Id of the recording; None where there is none.
         lessons: The lessons, in order.
     """
 
@@ -118,7 +123,8 @@ def make_recording_practice(
     ):
         require_practice_name_free(store, person)
         there = _find_recording(store, person)
-        if there is not None and not again and _read_truth(settings) and there.problem is None:
+        is_made = _read_truth(settings) and there and _has_faults(store, there)
+        if there and is_made and there.problem is None and not again:
             return {"dataset": name, "recording": there.id, "made": False}
         if _read_truth(settings) is None or not film.is_file():
             film.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -196,6 +202,12 @@ def _track_shots_and_plant_faults(
     replace_shots(store, recording.id, planted, None, actor=actor)
 
 
+def _has_faults(store: Store, recording: Recording) -> bool:
+    """Whether the recording was made to its end: its shots are found, and changed since, which planting does last."""
+    with store.read() as session:
+        return require_recording(session, recording.id).revision > 1
+
+
 def _create_dataset_if_missing(store: Store, person: str | None, actor: str) -> None:
     """Make the practice dataset, empty, where it is missing; a person leads in their own."""
     with store.write() as session:
@@ -215,10 +227,10 @@ def read_recording_practice(
     """What is right of the practice recording; no lessons where it is not made yet, or not seen."""
     name, truth = make_recording_practice_name(person), _read_truth(settings)
     recording = _find_recording(store, person)
-    if recording is None or truth is None or not recording.indexed:
+    if recording is None or not visibility.sees(recording.dataset_id):
         return RecordingPractice(name, None, ())
-    if not visibility.sees(recording.dataset_id):
-        return RecordingPractice(name, None, ())
+    if truth is None or not _has_faults(store, recording):
+        return RecordingPractice(name, recording.id, ())
     frames = read_cameras_of_frames(store, recording, range(recording.frames or 0))
     lessons = (
         judge_shots(truth, get_shots(store, recording.id).items),

@@ -14,7 +14,12 @@ from app.db.locks import hold_practice_lock
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError
 from app.features.datasets.queries import find_dataset
-from app.features.datasets.service import delete_dataset, insert_dataset, list_datasets
+from app.features.datasets.service import (
+    delete_dataset,
+    get_dataset,
+    insert_dataset,
+    list_datasets,
+)
 from app.features.groups.state import GroupState, read_states
 from app.features.imports.queries import list_known_groups
 from app.features.imports.sources import ImportSource, import_source
@@ -176,7 +181,12 @@ def make_practice_dataset(
         name = make_practice_name(person)
         _require_practice_name_free(store, settings, person)
         ids = _group_ids(store, name)
-        if len(ids) == len(LESSONS) and not again and _are_lesson_files_complete(settings):
+        is_made = (
+            len(ids) == len(LESSONS)
+            and get_dataset(store, name).solved == len(ids)
+            and _are_lesson_files_complete(settings)
+        )
+        if is_made and not again:
             return {"dataset": name, "groups": len(ids), "first": ids[0], "made": False}
         ids = _make_lessons(store, settings, progress, again and bool(ids), actor, person)
     return {"dataset": name, "groups": len(ids), "first": ids[0], "made": True}

@@ -45,8 +45,8 @@ export function RecordingPracticePart({ onLeave }) {
 				${lessons.length === 0 ? html`<button class="button" type="button" data-needs="annotate" data-of="" aria-disabled=${busy} onClick=${() => begin(false)}>Make the recording</button>`
 					: html`
 						${next ? html`<a class="button" href=${place(next.frame)} onClick=${onLeave}>Go to: ${NAMES[next.name].toLowerCase()}</a>` : null}
-						<button class="button" type="button" onClick=${reload}>Check again</button>
-						<button class="button" type="button" data-needs="annotate" data-of="" aria-disabled=${busy} onClick=${() => begin(true)}>Restart the practice</button>`}
+						<button class="button" type="button" onClick=${reload}>Check again</button>`}
+				${value?.recording ? html`<button class="button" type="button" data-needs="annotate" data-of="" aria-disabled=${busy} onClick=${() => begin(true)}>Restart the practice</button>` : null}
 			</p>
 			${job && job.state !== 'done' ? html`<${JobProgress} job=${job} />` : null}
 			${refused ? html`<${FormError} error=${refused} />` : null}

@@ -60,6 +60,8 @@ RESULTS = [
     ),
     ("practice", {"groups": 8, "made": True}, "8 practice groups made."),
     ("practice", {"groups": 8, "made": False}, "The 8 practice groups already exist."),
+    ("practice", {"recording": 1, "made": True}, "The practice recording is made."),
+    ("practice", {"recording": 1, "made": False}, "The practice recording already exists."),
     ("rig", {"cameras": [1, 2], "accepted": None}, "An adjustment of 2 cameras is proposed."),
     (
         "rig",

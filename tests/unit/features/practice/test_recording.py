@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from app.db.store import Store
-from app.errors import ConflictError
+from app.errors import ConflictError, JobCancelled
 from app.features.imports.ingest import ensure_dataset
 from app.features.practice import recording as module
 from app.features.practice.recording import (
@@ -100,6 +100,24 @@ def test_each_lesson_is_open_until_it_is_mended_and_says_what_is_right_in_number
     assert again == {**made, "made": False}
     afresh = make_recording_practice(store, lambda *_: None, actor="ann", again=True)
     assert afresh["made"] and lessons(store)["shots"].state == "open"
+
+
+@pytest.mark.parametrize("step", ["Finding its shots.", "Following the camera of the replay."])
+def test_one_whose_making_was_stopped_is_made_anew(
+    store: Store, monkeypatch: pytest.MonkeyPatch, step: str
+) -> None:
+    monkeypatch.setattr(module, "PARTS", SHORT)
+
+    def stop_there(_done: int, _total: int | None = None, sentence: str = "", /) -> None:
+        if sentence.startswith(step):
+            raise JobCancelled
+
+    with pytest.raises(JobCancelled):
+        make_recording_practice(store, stop_there, actor="ann")
+    half = read_recording_practice(store, store.settings)
+    assert half.recording is not None and half.lessons == ()
+    made = make_recording_practice(store, lambda *_: None, actor="ann")
+    assert made["made"] and {one.state for one in lessons(store).values()} == {"open"}
 
 
 def test_a_dataset_of_that_name_is_left_alone(store: Store, tmp_path: Path) -> None:

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 
+import numpy as np
 import pytest
 
 from app.db.log import read_log
 from app.db.store import Store
 from app.errors import JobCancelled
 from app.features.datasets.service import get_dataset, list_datasets
-from app.features.practice.service import SampleDataset, make_sample_dataset
+from app.features.practice.service import (
+    SampleDataset,
+    make_practice_dataset,
+    make_sample_dataset,
+)
 from app.sample import SampleOrder
 from app.sample.scene import read_truth
 from app.sample.write import SampleReport
@@ -52,6 +57,23 @@ def test_one_that_was_stopped_before_it_was_solved_is_completed(store: Store) ->
     left = get_dataset(store, "drawn")
     assert left.solved < left.groups
     assert make(store).is_complete
+
+
+def test_practice_groups_that_were_stopped_before_they_were_solved_are_completed(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    blank = np.zeros((720, 1280, 3), np.uint8)
+    monkeypatch.setattr("app.features.practice.lessons.render_view", lambda _scene, _key: blank)
+
+    def stop(_done: int, _total: int | None = None, sentence: str = "", /) -> None:
+        if sentence == "Solving the groups.":
+            raise JobCancelled
+
+    with pytest.raises(JobCancelled):
+        make_practice_dataset(store, store.settings, stop, actor="ann")
+    assert get_dataset(store, "practice").solved < 8
+    make_practice_dataset(store, store.settings, lambda *_: None, actor="ann")
+    assert get_dataset(store, "practice").solved == 8
 
 
 def test_the_log_says_who_made_it(store: Store) -> None:
