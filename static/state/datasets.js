@@ -23,6 +23,11 @@ export function isPractice(name) {
 	return name === PRACTICE || name.startsWith(`${PRACTICE} `);
 }
 
+/** Whether it holds practice groups or (`recording practice`, `recording practice NAME`) a practice recording. @param {string} name */
+function isAnyPractice(name) {
+	return isPractice(name.replace(/^recording /, ''));
+}
+
 const remembered = stored('dataset', '');
 
 /** The dataset of the address bar, else the last one used, else the first. */
@@ -31,7 +36,7 @@ export const dataset = computed(() => {
 	const named = pageDataset.value || param('dataset');
 	if (named) return all.find((one) => one.name === named) ?? null;
 	// Nobody is sent to the practice who did not ask for it.
-	const first = all.find((one) => !isPractice(one.name)) ?? all[0];
+	const first = all.find((one) => !isAnyPractice(one.name)) ?? all[0];
 	return all.find((one) => one.name === remembered.value) ?? first ?? null;
 });
 
