@@ -147,15 +147,15 @@ WORDS = {
     "clean": LessonTemplates(
         question="Read the card with the result and compare it with the pictures. Would you let this group "
         "into the dataset?",
-        hint="Look at the blue lines on the white paint and at the ball in the small pictures "
-        "below. When both fit in every view, nothing is wrong.",
+        hint="Look at the blue lines on the white paint and at the ball in the small pictures below "
+        "or beside the views. When both fit in every view, nothing is wrong.",
         fault="Nothing is wrong with this group: every line lies on its paint and the views agree "
         "on one ball.",
         best="Press A to accept it.",
     ),
     "wrong_label": LessonTemplates(
         question="The field lines of one view do not fit. Find out why before you decide.",
-        hint="Compare the names: click a red line to read its marking. Is that "
+        hint="Compare the names: the marking is written beside the line that does not fit. Is that "
         "the line that you see?",
         fault="In view {view} the line called “{marking}” is really “{true_marking}”.",
         best="Press Enter: it gives the line its right name, as the card says. Then press A.",
@@ -163,8 +163,8 @@ WORDS = {
     "swapped_sides": LessonTemplates(
         question="Each view fits its own lines. Do they show the ball at the same place of the "
         "pitch?",
-        hint="Look at the small pitch below: on which side does each camera stand, and which goal "
-        "do the views show? Replays are sometimes labelled from the other end.",
+        hint="Look at the small pitch below or beside the views: on which side does each camera "
+        "stand, and which goal do the views show? Replays are sometimes labelled from the other end.",
         fault="In view {view} left and right are exchanged in every label.",
         best="Press Enter: it swaps left and right in view {view}. Then press A.",
     ),
@@ -178,8 +178,8 @@ WORDS = {
     ),
     "missing_ball": LessonTemplates(
         question="The views are calibrated, and still there is no 3D ball. What is missing?",
-        hint="Look at the small ball pictures below: does every view have a ball? Where the rays "
-        "of the other views cross the picture is where to search.",
+        hint="Look at the small ball pictures below or beside the views: does every view have a "
+        "ball? Where the rays of the other views cross the picture is where to search.",
         fault="The ball can be seen in view {view}, but is not annotated there.",
         best="Press Enter, click the ball on the dotted line in view {view}, then press A.",
     ),
@@ -204,8 +204,8 @@ WORDS = {
     ),
     "tiny_baseline": LessonTemplates(
         question="Everything fits, and still the group cannot be used. Where do the cameras stand?",
-        hint="Look at the small pitch below: how far are the cameras from each other? Two views "
-        "from one place say nothing about depth.",
+        hint="Look at the small pitch below or beside the views: how far are the cameras from each "
+        "other? Two views from one place say nothing about depth.",
         fault="Both cameras stand at nearly one place: view {view} is beside the main camera.",
         best="No edit can fix that. Press X, then Enter for “Duplicate view”.",
     ),
