@@ -371,7 +371,22 @@ class TestFiveKeys:
         return keys
 
 
+OUTSIDE = """() => {
+  const card = document.querySelector('.help-page');
+  const { bottom } = card.getBoundingClientRect();
+  return [...card.querySelectorAll('*')]
+    .filter((one) => one.getBoundingClientRect().bottom > bottom).map((one) => one.textContent);
+}"""
+
+
 class TestEverybody:
+    def test_every_part_stands_inside_its_card(self, open_page: OpenPage) -> None:
+        page = open_page(None, size={"width": 1100, "height": 700})
+        for part in ("keys", "legend", "words", "guide", "practice"):
+            page.goto(f"/help/{part}")
+            expect(page.get_by_role("tabpanel").locator("p, dt").first).to_be_visible()
+            assert page.evaluate(OUTSIDE) == [], part
+
     @pytest.mark.parametrize("part", ["keys", "legend", "practice"])
     def test_axe_finds_nothing_serious_in_both_schemes(
         self, open_page: OpenPage, part: str

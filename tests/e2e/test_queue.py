@@ -206,6 +206,18 @@ class TestQueryBox:
         expect(page.locator(".field--query")).to_have_value("jac>=0.05 jac<=1")
 
 
+class TestLowWindow:
+    def test_scrolls_to_its_rows_and_shows_three_at_once(self, open_page: OpenPage) -> None:
+        page = open_page("/groups?dataset=sample", size={"width": 720, "height": 450})
+        expect(page.get_by_role("region", name="First steps")).to_be_visible()
+        row = page.locator(".queue-row:not(.queue-row--head)")
+        row.nth(2).wait_for()
+        page.mouse.move(360, 80)
+        page.mouse.wheel(0, 2000)
+        for place in range(3):
+            expect(row.nth(place)).to_be_in_viewport(ratio=1)
+
+
 class TestVerdicts:
     def test_a_rejected_group_says_why(self, open_page: OpenPage) -> None:
         page = opened(open_page, "number<=1")
