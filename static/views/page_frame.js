@@ -14,18 +14,18 @@ import { Header } from './header.js';
 
 /**
  * @param {{
- *   current: string, title: string, where?: ComponentChildren, actions?: ComponentChildren,
+ *   current: string, of?: string, title: string, where?: ComponentChildren, actions?: ComponentChildren,
  *   children?: ComponentChildren
- * }} props `where` stands in the middle of the header, `actions` at its right
+ * }} props `of`: see `Header`; `where` stands in the middle of the header, `actions` at its right
  */
-export function PageFrame({ current, title, where, actions, children }) {
+export function PageFrame({ current, of, title, where, actions, children }) {
 	useEffect(() => { document.title = `${title} · Touchline`; }, [title]);
 	useEffect(() => { if (datasets.value === null) loadDatasets(); }, []);
 	// A notice speaks about the page on which it came up.
 	useEffect(() => dismiss, []);
 	return html`
 		<div class="page">
-			<${Header} current=${current}>
+			<${Header} current=${current} of=${of}>
 				<div class="header__middle"><span class="header__where">${where}</span></div>
 				${actions}
 			<//>

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from urllib.parse import quote
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from tests.e2e.screen import Screen, judge, until, withdraw_verdict
 
@@ -71,6 +71,23 @@ class TestFarKeys:
         screen.press("c")
         expect(page.get_by_text("This is the first group of the queue.")).to_be_attached()
         stands(page, queue, 0)
+
+
+class TestHeader:
+    def test_names_the_dataset_of_the_group_whose_history_is_shown(
+        self, open_page: OpenPage
+    ) -> None:
+        def put_another_first(route: Route) -> None:
+            answer = route.fetch()
+            items = answer.json()["items"]
+            route.fulfill(json={"items": [{**items[0], "id": 999, "name": "another"}, *items]})
+
+        page = open_page(None)
+        page.route("**/api/v1/datasets", put_another_first)
+        page.goto("/review/4/history")
+        link = page.get_by_role("link", name="Yield", exact=True)
+        expect(link).to_have_attribute("href", "/datasets/sample/yield")
+        expect(page.get_by_role("button", name="Dataset and pages")).to_contain_text("sample")
 
 
 class TestNextGroup:

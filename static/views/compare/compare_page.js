@@ -43,7 +43,7 @@ export function ComparePage() {
 	useEffect(() => { document.title = groups ? `${groups[0].label}, compared · Touchline` : 'Touchline'; }, [groups]);
 	return html`
 		<div class="compare">
-			<${Header} current="compare"><div class="header__middle"><span class="header__where">${groups ? groups[0].label : ''}</span></div><//>
+			<${Header} current="compare" of=${groups?.[0].dataset.name}><div class="header__middle"><span class="header__where">${groups ? groups[0].label : ''}</span></div><//>
 			<div class="bars"><${NoticeBar} /></div>
 			${groups ? html`<${CompareWorkspace}
 				names=${groups.map(nameOf)} images=${new Map(groups[0].views.map((view) => [view.key, view.image]))}

@@ -64,7 +64,7 @@ export function HistoryPage() {
 	const group = found.value?.group;
 	const where = group ? html`<a class="link" href=${reviewAddress(id)}>${group.label}</a>` : null;
 	return html`
-		<${PageFrame} current="history" title="History of a group" where=${where}>
+		<${PageFrame} current="history" of=${group?.dataset.name} title="History of a group" where=${where}>
 			${found.error ? html`<${Trouble} title="The history cannot be shown" error=${found.error} retry=${found.reload} />` : null}
 			${!found.value && !found.error ? html`<${Loading} what="the history" />` : null}
 			${found.value && group ? html`
