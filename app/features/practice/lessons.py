@@ -155,8 +155,8 @@ WORDS = {
     ),
     "wrong_label": LessonTemplates(
         question="The field lines of one view do not fit. Find out why before you decide.",
-        hint="Compare the names: the marking is written beside the line that does not fit. Is that "
-        "the line that you see?",
+        hint="Compare the names: beside the yellow line stand its marking and the one that would fit. "
+        "Which of them is the line that you see?",
         fault="In view {view} the line called “{marking}” is really “{true_marking}”.",
         best="Press Enter: it gives the line its right name, as the card says. Then press A.",
     ),
