@@ -68,7 +68,7 @@ def serve(
 
     require_multiprocess_support(settings, settings.web_workers)
     log_to_stderr(settings.log_format)
-    with hold_server_lock(settings, shared=not get_dialect(settings).is_file):
+    with hold_server_lock(settings, shared=not get_dialect(settings).is_file) as tell_address:
         _prepare_home(settings)
         if not settings.team and team is None:
             with open_store(settings, may_create=True) as store:
@@ -79,6 +79,7 @@ def serve(
                 pass
             _make_sample(settings)
         with open_listening_socket(settings.host, settings.port) as (socket, address):
+            tell_address(settings.url or address)
             if settings.web_workers > 1:
                 _print_address(settings, address)
                 serve_with_processes(settings.web_workers, _serve_process, settings, socket)

@@ -28,12 +28,12 @@ OPENING_SECONDS = 60.0
 """So long who opens the database waits for another process that does, and may be migrating it."""
 
 
-def try_to_lock(handle: int, seconds: float) -> bool:
+def try_to_lock(handle: int, seconds: float, kind: int = fcntl.LOCK_EX) -> bool:
     """Take the lock of an open file or folder; False where others had it all the while."""
     until = time.monotonic() + seconds
     while True:
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(handle, kind | fcntl.LOCK_NB)
             return True
         except BlockingIOError:
             if time.monotonic() >= until:
@@ -114,29 +114,52 @@ def hold_exclusive_database_lock(settings: Settings, why: str) -> Iterator[None]
 
 
 @contextmanager
-def hold_server_lock(settings: Settings, *, shared: bool = False) -> Iterator[None]:
+def hold_server_lock(
+    settings: Settings, *, shared: bool = False
+) -> Iterator[Callable[[str], None]]:
     """Hold the home for one server, or ``shared`` for several; the file tells a process id.
+
+    The value is to be called with the address of the server once it is known (``read_server_address``).
 
     Raises:
         StorageError: Another server holds it.
     """
     handle = _open_lock_file(make_home(settings) / SERVER_LOCK)
     try:
-        try:
-            kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
-            fcntl.flock(handle, kind | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            holder = os.pread(handle, 32, 0).decode(errors="replace").strip()
+        # A command that looks for the address holds it for a moment.
+        if not try_to_lock(handle, NOTICE_SECONDS, fcntl.LOCK_SH if shared else fcntl.LOCK_EX):
+            holder = _read_lock_lines(handle)[0]
             process = f" (process {holder})" if holder.isdigit() else ""
             raise StorageError(
                 f"another Touchline server already uses this home folder{process}",
                 hint="Stop it, or set TOUCHLINE_HOME to another folder.",
-            ) from error
-        os.ftruncate(handle, 0)
-        os.pwrite(handle, f"{os.getpid()}\n".encode(), 0)
-        yield
+            )
+
+        def tell_address(address: str) -> None:
+            os.ftruncate(handle, 0)
+            os.pwrite(handle, f"{os.getpid()}\n{address}\n".encode(), 0)
+
+        tell_address("")
+        yield tell_address
     finally:
         os.close(handle)
+
+
+def read_server_address(settings: Settings) -> str | None:
+    """The address of the server that holds the home; None: there is none, or it is not known."""
+    if not (settings.home / SERVER_LOCK).is_file():
+        return None
+    handle = _open_lock_file(settings.home / SERVER_LOCK)
+    try:
+        if try_to_lock(handle, 0.0):
+            return None
+        return (_read_lock_lines(handle)[1:] or [""])[0] or None
+    finally:
+        os.close(handle)
+
+
+def _read_lock_lines(handle: int) -> list[str]:
+    return os.pread(handle, 1000, 0).decode(errors="replace").split("\n")
 
 
 @contextmanager

@@ -9,7 +9,7 @@ import typer
 from app.errors import InputError
 from app.terminal.options import Json, get_current_actor, read_settings
 from app.terminal.server import open_store
-from app.terminal.terminal import print_json, print_values, say
+from app.terminal.terminal import print_error, print_json, print_values, say
 
 if TYPE_CHECKING:
     from app.features.people.access_tokens import AccessToken
@@ -88,11 +88,18 @@ def invite_many(
 
 
 def _make_mailer() -> LinkMailer:
+    from app.db.locks import read_server_address
     from app.features.people.invitations import LinkMailer
     from app.mail import read_mail_server
 
     settings = read_settings()
-    base = settings.url or f"http://{settings.host}:{settings.port}"
+    base = settings.url or read_server_address(settings)
+    if base is None:
+        base = f"http://{settings.host}:{settings.port}"
+        print_error(
+            f"no server of this home is running; the address {base} in links is assumed",
+            "Set TOUCHLINE_URL to the address that people open.",
+        )
     return LinkMailer(read_mail_server(settings), settings.url, base)
 
 

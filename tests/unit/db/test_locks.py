@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import fcntl
+import os
 
 import pytest
 
@@ -11,6 +12,7 @@ from app.db.locks import (
     hold_exclusive_database_lock,
     hold_practice_lock,
     hold_server_lock,
+    read_server_address,
 )
 from app.errors import BusyError, StorageError
 
@@ -75,6 +77,18 @@ class TestServerLock:
             pass
         with hold_server_lock(settings):
             pass
+
+    def test_its_address_is_known_as_long_as_it_runs(self, settings: Settings) -> None:
+        assert read_server_address(settings) is None
+        for shared in (False, True):
+            with hold_server_lock(settings, shared=shared) as tell_address:
+                assert read_server_address(settings) is None
+                tell_address("http://127.0.0.1:8471")
+                assert read_server_address(settings) == "http://127.0.0.1:8471"
+                named = pytest.raises(StorageError, match=rf"process {os.getpid()}\)")
+                with named, hold_server_lock(settings):
+                    pass
+            assert read_server_address(settings) is None
 
 
 class TestPracticeLock:

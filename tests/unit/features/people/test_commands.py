@@ -16,6 +16,7 @@ from typer.testing import CliRunner, Result
 
 from app.command_line import app
 from app.config import Settings
+from app.db.locks import hold_server_lock
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotLoggedInError
 from app.features.audit.queries import AuditQuery
@@ -78,6 +79,20 @@ class TestUsers:
         login = logins.find(logins.log_in("anna", SECRET))
         assert login is not None
         assert login.role is Role.LEAD
+
+    def test_a_link_has_the_address_of_the_running_server_or_says_that_it_is_assumed(
+        self, home: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        alone = run("users", "add", "anna")
+        assert "http://127.0.0.1:8000/join#" in alone.stdout
+        assert "http://127.0.0.1:8000 in links is assumed" in alone.stderr
+        with hold_server_lock(Settings()) as tell_address:
+            tell_address("http://127.0.0.1:8471")
+            beside = run("users", "reset", "anna")
+        assert "http://127.0.0.1:8471/join#" in beside.stdout and beside.stderr == ""
+        monkeypatch.setenv("TOUCHLINE_URL", "https://x.org")
+        named = run("users", "reset", "anna")
+        assert "https://x.org/join#" in named.stdout and named.stderr == ""
 
     def test_a_link_goes_by_mail_where_an_address_is_given(
         self, store: Store, monkeypatch: pytest.MonkeyPatch
