@@ -14,6 +14,26 @@ const PAUSE = 16;
 /** Milliseconds until it is asked again where the groups are still being counted. */
 const GATHERING = 2000;
 
+/** Thresholds as parameters of an address. @param {Values} values */
+export function textsOf(values) {
+	return Object.fromEntries(Object.entries(values).map(([name, value]) => [name, JSON.stringify(value)]));
+}
+
+/** The thresholds of an address that differ from those of the saved policy; what cannot be read is left out. @param {URLSearchParams} search @param {Values} present @returns {Values} */
+export function valuesIn(search, present) {
+	/** @type {Values} */
+	const values = {};
+	for (const [name, text] of search) {
+		try {
+			const value = JSON.parse(text);
+			if (name in present && value !== present[name]) values[name] = value;
+		} catch {
+			// Somebody wrote it by hand.
+		}
+	}
+	return values;
+}
+
 /**
  * The yield of the thresholds that are on screen; the last answer stays until the next.
  *

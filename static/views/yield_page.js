@@ -2,13 +2,14 @@
 /** What the thresholds cost: sliders, funnel and curves, redrawn while one drags. */
 
 import { html } from 'htm/preact';
-import { useState } from 'preact/hooks';
+import { useLayoutEffect, useState } from 'preact/hooks';
 
 import { getPolicies, getPolicy, putPolicy } from '../api/policies.js';
 import { count, words } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
+import { address, navigate, page, place } from '../lib/router.js';
 import { loadDatasets } from '../state/datasets.js';
-import { useWhatIf } from '../state/what_if.js';
+import { textsOf, useWhatIf, valuesIn } from '../state/what_if.js';
 import { DatasetFrame } from './dataset_frame.js';
 import { pageAddress } from './dataset_menu.js';
 import { Funnel } from './funnel.js';
@@ -20,6 +21,9 @@ import { Distances, isUnmeasured, Splits, YieldCurves } from './yield_cards.js';
 
 /** @import {PolicyField, PolicyState, ShippedPolicy, Threshold, Values, YieldJson} from '../api/policies.js' */
 /** @import {DatasetJson} from '../api/types.js' */
+
+/** Milliseconds without a change until thresholds are written into the address: browsers allow few such writes. */
+const SETTLED = 250;
 
 /** @typedef {{policy: PolicyState, etag: string, shipped: ShippedPolicy[], fields: PolicyField[]}} Loaded */
 
@@ -34,12 +38,26 @@ function Difference({ answer, name, changed }) {
 	`;
 }
 
+/** Write the thresholds into the address once they rest, so that a reload and Back find them. @param {string} dataset @param {Values} values */
+function useValuesInAddress(dataset, values) {
+	useLayoutEffect(() => {
+		const timer = setTimeout(() => {
+			const shown = page.peek();
+			// The next page may be asked for and not yet drawn.
+			if (shown.page !== 'yield' || shown.dataset !== dataset) return;
+			navigate(address(place.peek().path, textsOf(values)), { replace: true });
+		}, SETTLED);
+		return () => clearTimeout(timer);
+	}, [values]);
+}
+
 /** @param {{one: DatasetJson, loaded: Loaded, reload: () => void}} props */
 function YieldBody({ one, loaded, reload }) {
 	const { policy, etag, shipped, fields } = loaded;
-	const [values, setValues] = useState(/** @type {Values} */ ({}));
+	const [values, setValues] = useState(() => valuesIn(place.peek().search, policy.values));
 	const [saving, setSaving] = useState(false);
 	const { answer, error } = useWhatIf(one.id, values, policy.hash);
+	useValuesInAddress(one.name, values);
 	const changed = Object.keys(values).length;
 	/** @param {string} name @param {Threshold} value */
 	function change(name, value) {
