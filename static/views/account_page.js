@@ -8,10 +8,10 @@ import { endSession, getSessions, putPassword } from '../api/people.js';
 import { ApiError } from '../api/problem.js';
 import { getOwnWays } from '../api/sign_on.js';
 import { browserName } from '../lib/browser_name.js';
-import { logOut, me } from '../state/me.js';
+import { isTeam, logOut, me } from '../state/me.js';
 import { FormError } from './form_error.js';
 import { useSessionForm } from './login.js';
-import { Loading, PageFrame, Trouble } from './page_frame.js';
+import { Loading, NoAccounts, PageFrame, Trouble } from './page_frame.js';
 import { PasskeysCard } from './passkeys_card.js';
 import { SecondFactorCard } from './second_factor.js';
 import { TokenCard } from './token_card.js';
@@ -58,6 +58,10 @@ function PasswordForm({ changed }) {
 }
 
 export function AccountPage() {
+	return isTeam ? html`<${Account} />` : html`<${NoAccounts} current="account" title="Account" />`;
+}
+
+function Account() {
 	const [sessions, setSessions] = useState(/** @type {OpenSessionJson[] | null} */ (null));
 	const [error, setError] = useState(/** @type {ApiError | null} */ (null));
 	const [factors, setFactors] = useState(0);

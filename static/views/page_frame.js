@@ -38,6 +38,18 @@ export function PageFrame({ current, of, title, where, actions, children }) {
 	`;
 }
 
+/** In place of a page about accounts where one person works alone. @param {{current: string, title: string}} props */
+export function NoAccounts({ current, title }) {
+	return html`
+		<${PageFrame} current=${current} title=${title} where=${html`<strong>${title}</strong>`}>
+			<section class="card empty">
+				<h2>There are no accounts</h2>
+				<p>One person works alone on this server, so nobody logs in. <code>touchline serve --team</code> requires a login.</p>
+			</section>
+		<//>
+	`;
+}
+
 /** @param {{what: string}} props */
 export function Loading({ what }) {
 	return html`<p class="page__loading" role="status">Reading ${what}…</p>`;

@@ -13,13 +13,13 @@ import { withForm, withTick, withValue } from '../lib/field.js';
 import { plural } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
 import { datasets } from '../state/datasets.js';
-import { myName } from '../state/me.js';
+import { isTeam, myName } from '../state/me.js';
 import { CopyField } from './copy_field.js';
 import { FormError } from './form_error.js';
 import { InviteManyCard } from './invite_many_card.js';
 import { MaintenanceCard } from './maintenance_bar.js';
 import { MembersCard } from './members_card.js';
-import { Loading, PageFrame, Trouble } from './page_frame.js';
+import { Loading, NoAccounts, PageFrame, Trouble } from './page_frame.js';
 import { TokenTable } from './token_table.js';
 import { When } from './when.js';
 
@@ -227,6 +227,10 @@ function LocalWork({ people, adoptedBy, give }) {
 }
 
 export function PeoplePage() {
+	return isTeam ? html`<${People} />` : html`<${NoAccounts} current="people" title="People" />`;
+}
+
+function People() {
 	const { found, made, shown, linked, error, act, setMade, setShown, setLinked } = usePeople();
 	const people = found.value?.items;
 	const mail = found.value?.mail ?? false;

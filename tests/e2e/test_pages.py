@@ -155,6 +155,15 @@ class TestNavigation:
         expect(page.locator(".funnel")).to_be_visible()
 
 
+class TestAlone:
+    def test_a_page_of_accounts_says_that_there_are_none(self, open_page: OpenPage) -> None:
+        page = open_page("/account")
+        for path in ("/account", "/people"):
+            page.goto(path)
+            expect(page.get_by_role("heading", name="There are no accounts")).to_be_visible()
+            assert serious_in_both(page) == []
+
+
 class TestDialogs:
     """Opened, used by everybody, left by Escape; the focus then is where it was."""
 
@@ -210,7 +219,11 @@ class TestYield:
         slider.press("End")
         expect(page.locator(".yield__difference")).to_contain_text("0 pass")
         expect(page.locator(".funnel tr").last).to_contain_text("0")
+        page.wait_for_url("**/yield?min_jac=*")
+        page.reload()
+        expect(page.locator(".yield__difference")).to_contain_text("0 pass")
         page.get_by_role("button", name="Reset").click()
+        page.wait_for_url("**/yield")
         expect(page.locator(".yield__difference")).to_have_text(before)
         page.get_by_label("As numbers").or_(page.get_by_text("As numbers")).click()
         expect(page.locator(".chart__numbers tbody tr")).to_have_count(101)
