@@ -1,6 +1,6 @@
 """Job runner: runs jobs beside the requests, one after the other, each with progress and a record.
 
-One runs at a time, and beside it one that only reads (``BESIDE``) where no earlier job of its dataset
+One runs at a time, and beside it one that changes nothing of its dataset (``BESIDE``) where no earlier job of its dataset
 is left. Those who wait have their turns person by person.
 
 The record of a job is a row of the database; the work itself is a function of this process. A
@@ -42,8 +42,8 @@ log = structlog.get_logger("touchline.jobs")
 
 CLOSE_SECONDS = 10.0
 """How long a server that stops waits for the running job's next step."""
-BESIDE = frozenset({"export"})
-"""Kinds that only read and that somebody waits for; a long import or solve does not keep them waiting."""
+BESIDE = frozenset({"export", "freeze"})
+"""Kinds that change nothing of their dataset and that somebody waits for; long work elsewhere does not keep them waiting."""
 PROMPT = frozenset({"solve"})
 """Kinds that go before the others: somebody looks at the numbers and waits."""
 KEPT = {"solve": 200, "bulk": 200, "verify": 200}

@@ -1,6 +1,6 @@
 """Whose job is next, and where it runs: small work here, other work in a worker process.
 
-Solving goes first, then person by person; an export runs beside another dataset's job.
+Solving goes first, then person by person; an export or a freeze runs beside another dataset's job.
 """
 
 from __future__ import annotations
@@ -54,13 +54,16 @@ class TestRunQueue:
         jobs.wait(verify.id, SECONDS)
         assert order == ["solve", "verify"]
 
-    def test_an_export_waits_for_nothing_of_another_dataset(self, jobs: Jobs, store: Store) -> None:
+    @pytest.mark.parametrize("kind", ["export", "freeze"])
+    def test_exports_and_freezing_wait_for_nothing_of_another_dataset(
+        self, jobs: Jobs, store: Store, kind: str
+    ) -> None:
         demo, other = (ensure_dataset(store, name, "ann") for name in ("demo", "other"))
         long, order = Gate(), list[str]()
         one = submit(jobs, long, dataset_id=demo, kind="import")
         assert long.started.wait(SECONDS)
-        own = submit(jobs, lambda _: order.append("own"), dataset_id=demo, kind="export")
-        free = submit(jobs, lambda _: order.append("free"), dataset_id=other, kind="export")
+        own = submit(jobs, lambda _: order.append("own"), dataset_id=demo, kind=kind)
+        free = submit(jobs, lambda _: order.append("free"), dataset_id=other, kind=kind)
         assert jobs.wait(free.id, SECONDS).state == "done"
         assert jobs.get(own.id).state == "waiting"
         long.finish.set()
