@@ -9,9 +9,11 @@ from dataclasses import dataclass, field
 
 from app.formats.fields import id_to_text
 from app.formats.frame_names import (
+    HolderFolders,
     frame_path_by_match,
-    frame_path_in_split,
-    prefix_view_key_with_group,
+    list_frame_stems_in_split,
+    list_possible_export_keys,
+    view_file_path,
     with_export_key,
 )
 from app.formats.gamestate_reader import sequence_frame_path
@@ -132,13 +134,6 @@ _NUMBER = re.compile(r"(?:frame|image|img)?[ _-]?(\d{1,9})", re.IGNORECASE | re.
 _DIGITS = re.compile(r"\d{1,9}", re.ASCII)
 _MATCH = " - "
 """Stands in the name of every SoccerNet match."""
-_HOLDER = re.compile(
-    r"(labels?|images?|imgs?|frames?|frames-v3|pred(iction)?s?|predict|results?|detect(ion)?s?"
-    r"|out(put)?s?|runs?|exp|train(ing)?|val(id|idation)?|test|challenge|data(sets?)?|coco|yolo"
-    r"|csv|txt|json|box(es)?|balls?|careful|cameras?|calib(ration)?s?|\.)[-_]?[0-9]*",
-    re.IGNORECASE | re.ASCII,
-)
-"""Folders that hold predictions of any match; every other folder may be the name of one."""
 _SEVERAL = -1
 """Stands in the index for a name that fits several frames."""
 
@@ -175,12 +170,13 @@ class FrameNameIndex:
     """
 
     frames: Mapping[int, NamedFrame]
-    stations: Mapping[str, tuple[int, ...]]
     _index: Mapping[str, int] = field(repr=False)
     _telling: frozenset[str] = field(repr=False)
     """Names of the index that tell the match, whatever stands before them."""
     _numbered: Mapping[int, int] = field(default_factory=dict, repr=False)
-    _views: Mapping[str, tuple[int, ...]] = field(default_factory=dict, repr=False)
+    _stations: Mapping[str, tuple[int, ...]] = field(default_factory=dict, repr=False)
+    """Frames of a static camera, and views of one match that are called alike, by their names."""
+    _holders: HolderFolders = field(default_factory=HolderFolders, repr=False)
 
     @staticmethod
     def of(frames: Iterable[NamedFrame]) -> FrameNameIndex:
@@ -190,28 +186,34 @@ class FrameNameIndex:
         telling: set[str] = set()
         stations: dict[str, list[int]] = {}
         numbered: dict[int, int] = {}
-        views: dict[str, list[int]] = {}
         for frame in known.values():
-            if frame.station:
-                stations.setdefault(frame.station, []).append(frame.id)
-            own = _distinguishing_names(frame)
-            telling |= own
-            for name in own | _ambiguous_names(frame):
-                other = index.setdefault(name, frame.id)
-                if other != frame.id:
+            for name in _own_names(frame):
+                if index.setdefault(name, frame.id) != frame.id:
+                    index[name] = _SEVERAL
+        own = frozenset(index)
+        for frame in known.values():
+            distinguishing = _distinguishing_names(frame)
+            telling |= distinguishing
+            # As in an export, the name of one frame is not made for another one.
+            for name in (distinguishing | _ambiguous_names(frame)) - own:
+                if index.setdefault(name, frame.id) != frame.id:
                     index[name] = _SEVERAL
             for number in _parse_frame_numbers(frame):
                 if numbered.setdefault(number, frame.id) != frame.id:
                     numbered[number] = _SEVERAL
-            if not frame.station:
-                views.setdefault(_strip_suffix(frame.view), []).append(frame.id)
-        by_station = {key: tuple(ids) for key, ids in stations.items()}
-        rigs = {
-            key: tuple(ids)
-            for key, ids in views.items()
-            if len(ids) > 1 and len({known[identity].match for identity in ids}) == 1
+            alike = frame.station or _strip_suffix(frame.view)
+            folders = _strip_suffix(frame.match).split("/") if frame.match else []
+            for start in range(len(folders) + 1):
+                stations.setdefault("/".join((*folders[start:], alike)), []).append(frame.id)
+        by_station = {
+            name: tuple(ids)
+            for name, ids in stations.items()
+            if len({known[identity].match for identity in ids}) == 1
         }
-        return FrameNameIndex(known, by_station, index, frozenset(telling), numbered, rigs)
+        holders = HolderFolders(
+            name for frame in known.values() for name in (frame.group, frame.match)
+        )
+        return FrameNameIndex(known, index, frozenset(telling), numbered, by_station, holders)
 
     def find(self, name: str) -> NamedFrame | None:
         """The one frame that a name means, or None.
@@ -245,24 +247,40 @@ class FrameNameIndex:
         if self._find_frame_id(name) == _SEVERAL:
             return "fits several frames of the dataset; name its match or group, too, as MATCH/GROUP/VIEW"
         if _strip_suffix(name).rsplit("/", 1)[-1] in self._index:
-            return "is not a frame of the dataset: its folders name none of the matches"
+            return "is not a frame of the dataset: its folders name no group or match"
         return "is not a frame of the dataset"
 
-    def find_station_frames(self, name: str) -> tuple[int, ...]:
-        """Ids of all frames of a camera of a rig: a static one, or views of one match called alike."""
-        last = _strip_suffix(name).rsplit("/", 1)[-1]
-        return (
-            self.stations.get(last)
-            or self._views.get(_strip_suffix(name))
-            or self._views.get(last, ())
-        )
+    def find_station_frames(self, name: str, top_folder: str = "") -> tuple[int, ...]:
+        """Ids of all frames of a camera of a rig: a static one, or views of one match called alike.
+
+        Args:
+            name: Folders before the camera have to be those of its match, or hold files of any match;
+                others do not matter where one camera alone has the name.
+            top_folder: A folder that names nothing.
+        """
+        parts = _strip_suffix(name).split("/")
+        for start in range(len(parts)):
+            known = "/".join(parts[start:])
+            found = self._stations.get(known)
+            if found is None:
+                continue
+            first = self.frames[found[0]]
+            folders = parts[parts[0] == top_folder : start]
+            alone = (len(found) == 1 or bool(first.station)) and (
+                len(folders) < 3 or not first.match
+            )
+            tells = bool(first.match) and known.startswith(f"{_strip_suffix(first.match)}/")
+            if alone or tells or not self._holders.find_other_folders(folders):
+                return found
+            return ()
+        return ()
 
     def _find_frame_id(self, name: str) -> int | None:
         parts = _strip_suffix(name).split("/")
         for start in range(len(parts)):
             known = "/".join(parts[start:])
             # 7_1 of a match that the dataset does not have is not the 7_1 that it has.
-            if known in self._telling or all(map(_HOLDER.fullmatch, parts[:start])):
+            if known in self._telling or not self._holders.find_other_folders(parts[:start]):
                 found = self._index.get(known)
                 if found is not None:
                     return found
@@ -279,6 +297,12 @@ def _strip_suffix(name: str) -> str:
     return _SUFFIX.sub("", name.replace("\\", "/").strip().strip("/"))
 
 
+def _own_names(frame: NamedFrame) -> set[str]:
+    """The names of a frame in an export in which no other frame is called alike."""
+    own = set() if frame.station else {_strip_suffix(frame.view)}
+    return {name for name in own.union(_exported_names(frame, most=1)) if name}
+
+
 def _distinguishing_names(frame: NamedFrame) -> set[str]:
     """Names that tell the match of a frame, or the group where it has no match."""
     view, group, match = (
@@ -292,7 +316,9 @@ def _distinguishing_names(frame: NamedFrame) -> set[str]:
     if match:
         names = {f"{place}/{name}" for place in places for name in within}
     else:
-        names = within if frame.station else {f"{group}/{view}"}
+        names = within if frame.station else set()
+    if not frame.station:
+        names.add(f"{group}/{view}")
     return _add_separator_variants(names) | {name for name in _exported_names(frame) if name}
 
 
@@ -328,21 +354,26 @@ def _parse_frame_numbers(frame: NamedFrame) -> set[int]:
     return {int(match[1]) for match in found if match}
 
 
-def _exported_names(frame: NamedFrame) -> Iterator[str]:
-    """Names that our exports give to the frame, without the folder of a split."""
+def _exported_names(frame: NamedFrame, most: int = 3) -> Iterator[str]:
+    """Names that our exports give to the frame, without the folder of a split.
+
+    Args:
+        frame: The frame.
+        most: How many of its keys in an export (``list_possible_export_keys``) count.
+    """
     station = Station(frame.station or frame.view, frame.size, shared=bool(frame.station))
     view = View(frame.view, station)
     group = Group(frame.group, (view,), match=frame.match)
-    in_group, flat = (
-        with_export_key(view, prefix_view_key_with_group(group, view, glue)) for glue in "/_"
-    )
-    for called in (view, in_group):
+    yield from list_frame_stems_in_split(group, view)
+    for key in list_possible_export_keys(group, view)[:most]:
+        called = with_export_key(view, key)
         yield _strip_suffix(frame_path_by_match(group, called, "", ".jpg"))
-    for called in (view, flat):
-        yield _strip_suffix(sequence_frame_path(group, called, "", ".jpg").split("/", 1)[-1])
-    yield _strip_suffix(frame_path_in_split(group, view, "", ".jpg").rsplit("/", 1)[-1])
-    for called in (view, in_group):
         lines = _strip_suffix(line_frame_path(group, called, "", ".jpg").rsplit("/", 1)[-1])
         # A plain number tells no match, and a static camera has one file of lines.
         if not frame.station and lines != _strip_suffix(frame.view).rsplit("/", 1)[-1]:
             yield lines
+        if not frame.station and key != frame.view:
+            yield _strip_suffix(view_file_path(group, called))
+    for key in list_possible_export_keys(group, view, "_")[:most]:
+        called = with_export_key(view, key)
+        yield _strip_suffix(sequence_frame_path(group, called, "", ".jpg").split("/", 1)[-1])

@@ -197,12 +197,22 @@ def read_predicted_cameras(
     if not cameras:
         problem = InputError(f"{path.name} contains no camera files (camera_<frame>.json)")
         raise found.report.problems[0] if found.report.problems else problem
-    for name, camera in cameras.items():
+    meant: dict[str, tuple[int, ...]] = {}
+    for name in cameras:
         frame = names.find(name)
-        ids = (frame.id,) if frame is not None else names.find_station_frames(name)
-        if not ids:
+        meant[name] = (
+            (frame.id,) if frame is not None else names.find_station_frames(name, path.stem)
+        )
+        if not meant[name]:
             found.unknown[name] += 1
             found.reasons[name] = names.explain_unknown_name(name)
+    # A camera of one frame counts before that of its rig.
+    for name in sorted(meant, key=lambda name: len(meant[name])):
+        camera = cameras[name]
+        ids = [identity for identity in meant[name] if identity not in found.cameras]
+        if meant[name] and not ids:
+            problem = "is a second camera of its view; the first one is used"
+            found.report.add_problem_at(path.name, name, None, problem)
         for identity in ids:
             annotated = names.frames[identity].size
             made_for = sizes.get(name) or size

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
@@ -47,7 +46,7 @@ from app.wording import plural
 _FILE = re.compile(r"(?:camera_)?(.+)\.(?:json|jsonl|ndjson|npz|ya?ml)", re.ASCII | re.IGNORECASE)
 _ENDINGS = ".json, .jsonl, .npz, .yml"
 _IMAGE = re.compile(r"\.(?:png|jpe?g|webp|bmp|tiff?)", re.ASCII | re.IGNORECASE)
-_ABSOLUTE = re.compile(r"/|[A-Za-z]:/")
+_ROOT = re.compile(r"^(?:[A-Za-z]:)?/+")
 
 _WRAPPERS = (
     "cam_params",
@@ -86,8 +85,8 @@ def read_cameras(
     ``{"cam1": {...}, ...}`` (also inside ``{"cameras": {...}}``, also double-encoded), a list or JSON
     lines whose objects name their image, numpy's ``.npz`` with K, R and t of each frame, or a COCO
     file of SynLoc. A camera is SoccerNet's object, also within PnLCalib's ``cam_params``, or matrices
-    (``camera_matrix``). The key is the stem of the file or the image, with
-    ``<league>/<season>/<match>/`` before it where it lies that deep. In an export as
+    (``camera_matrix``). The key is the stem of the file or the image, with the folders in which
+    it lies. In an export as
     sn-calibration ``match_info.json`` says where each frame came from: that is its key. ``sizes``
     takes the size of the images of each camera whose file states it, ``covariances`` what a file
     says of how well its camera is known (for ``covariance_from_json``).
@@ -127,12 +126,9 @@ def read_camera_files(
         {} if sizes is None else sizes, {} if covariances is None else covariances
     )
     known = places or {}
-    stems = Counter(_camera_key(name, deep=False) for name in names)
     for name in names:
-        deep = stems[_camera_key(name, deep=False)] > 1
-        _read_camera_file(
-            tree, name, known.get(name) or _camera_key(name, deep), cameras, stated, report, limits
-        )
+        key = known.get(name) or _camera_key(name)
+        _read_camera_file(tree, name, key, cameras, stated, report, limits)
     return cameras
 
 
@@ -188,13 +184,10 @@ def _report_files_not_called_camera(
         )
 
 
-def _camera_key(name: str, deep: bool) -> str:
+def _camera_key(name: str) -> str:
     place = PurePosixPath(name)
     found = _FILE.fullmatch(place.name)
-    stem = found.group(1) if found else place.stem
-    folders = place.parts[:-1]
-    keep = folders if deep else folders[-3:] if len(folders) >= 3 else ()
-    return "/".join((*keep, stem))
+    return str(place.with_name(found.group(1) if found else place.stem))
 
 
 def _read_camera_file(
@@ -213,14 +206,9 @@ def _read_camera_file(
         report.read += 1
         report.add_problem(error)
         return
-    stems = Counter(_camera_key_of_record(record, deep=False) for record, _ in items if record)
     for record, item in items:
         report.read += 1
-        called = key if record is None else record
-        if record is not None:
-            called = _camera_key_of_record(
-                record, deep=stems[_camera_key_of_record(record, deep=False)] > 1
-            )
+        called = key if record is None else _camera_key_of_record(record)
         try:
             camera = _parse_camera(item, shown, record)
             covariance = _read_covariance(item, camera, shown, record)
@@ -247,18 +235,10 @@ def _read_covariance(item: Any, camera: Camera, shown: str, record: str | None) 
     return found
 
 
-def _camera_key_of_record(record: str, deep: bool) -> str:
+def _camera_key_of_record(record: str) -> str:
     """Key of a camera that is named in a file: as ``_camera_key`` of the image's place."""
-    name = record.replace("\\", "/")
-    place = PurePosixPath(name)
-    if not _IMAGE.fullmatch(place.suffix):
-        return record
-    place = place.with_suffix("")
-    if _ABSOLUTE.match(name):
-        return place.name
-    folders = place.parts[:-1]
-    keep = folders if deep else folders[-3:] if len(folders) >= 3 else ()
-    return "/".join((*keep, place.name))
+    place = PurePosixPath(_ROOT.sub("", record.replace("\\", "/")))
+    return str(place.with_suffix("")) if _IMAGE.fullmatch(place.suffix) else record
 
 
 _Items = list[tuple[str | None, Any]]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 import unicodedata
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import PurePosixPath
 
@@ -59,10 +59,16 @@ def frame_path_in_split(group: Group, view: View, split: str, suffix: str) -> st
     """
     ending = PurePosixPath(view.key).suffix.lower()
     stem = _make_file_safe_stem(view.key)
-    if sum(_make_file_safe_stem(other.key).lower() == stem.lower() for other in group.views) > 1:
-        stem = f"{stem}_{_key_digest(view.key)}"
+    same = sum(_make_file_safe_stem(other.key).lower() == stem.lower() for other in group.views)
     ending = ending if ending in IMAGE_SUFFIXES else suffix
-    return f"images/{folder_name_of_split(split)}/{_key_digest(group.key)}_{stem}{ending}"
+    name = list_frame_stems_in_split(group, view)[same > 1]
+    return f"images/{folder_name_of_split(split)}/{name}{ending}"
+
+
+def list_frame_stems_in_split(group: Group, view: View) -> tuple[str, str]:
+    """The names that ``frame_path_in_split`` may give: without and with a digest of the view."""
+    stem = f"{_key_digest(group.key)}_{_make_file_safe_stem(view.key)}"
+    return stem, f"{stem}_{_key_digest(view.key)}"
 
 
 def _make_file_safe_stem(key: str) -> str:
@@ -103,6 +109,37 @@ def view_file_path(group: Group, view: View) -> str:
     # The key of a frame that is a group alone is the place of its file.
     match = group.match if view.key != group.key else ""
     return str(PurePosixPath(match) / strip_image_suffix(view.key))
+
+
+_HOLDER = re.compile(
+    r"(labels?|lines?|images?|imgs?|frames?|frames-v3|pred(?:iction)?s?|predict|results?"
+    r"|detect(?:ion)?s?|out(?:put)?s?|runs?|exp|train(?:ing)?|val(?:id|idation)?|test|challenge"
+    r"|unassigned|data(?:sets?)?|coco|yolo|csv|txt|json|box(?:es)?|balls?|careful|cameras?"
+    r"|calib(?:ration)?s?|\.)(?:[-_ ]?([0-9]+)|-[0-9]+x[0-9]+|[-_])?",
+    re.IGNORECASE | re.ASCII,
+)
+
+
+class HolderFolders:
+    """Tells folders that hold files of any group or match, as ``labels`` and ``predict2``.
+
+    Every other folder may be the name of one. So may ``frame_99`` where a group is called ``frame_7``.
+
+    Args:
+        names: Of the groups and matches of a dataset.
+    """
+
+    def __init__(self, names: Iterable[str] = ()):
+        found = (_HOLDER.fullmatch(part) for name in names for part in name.split("/"))
+        self._series = {match[1].lower() for match in found if match and match[2]}
+
+    def find_other_folders(self, folders: Iterable[str]) -> list[str]:
+        """The folders that may name a group or a match."""
+        return [folder for folder in folders if not self._holds_any(folder)]
+
+    def _holds_any(self, folder: str) -> bool:
+        found = _HOLDER.fullmatch(folder)
+        return found is not None and not (found[2] and found[1].lower() in self._series)
 
 
 Outline = tuple[Group, Mapping[str, str]]
@@ -150,6 +187,18 @@ def prefix_view_key_with_group(group: Group, view: View, glue: str = "/") -> str
     return key.replace("/", glue)
 
 
+def list_possible_export_keys(group: Group, view: View, glue: str = "/") -> tuple[str, ...]:
+    """The keys by which an export may call the files of a view: the first that no other frame has."""
+    stem = strip_image_suffix(view.key)
+    ending = view.key.removeprefix(stem)
+    digest = hashlib.sha256(f"{group.key}\0{view.key}".encode()).hexdigest()[:12]
+    return (
+        view.key,
+        prefix_view_key_with_group(group, view, glue),
+        f"{stem.replace('/', glue)}_{digest}{ending}",
+    )
+
+
 class ExportKeyAssigner:
     """Gives each view of an export the key by which its files are called.
 
@@ -188,7 +237,7 @@ class ExportKeyAssigner:
         return found
 
     def _choose_free_key(self, group: Group, view: View, splits: Mapping[str, str]) -> str:
-        for key in self._candidate_keys(group, view):
+        for key in list_possible_export_keys(group, view, self._glue):
             other = None if key == view.key else key
             names = self._hash_names_and_owners(group, view, splits, other)
             if all(
@@ -202,14 +251,6 @@ class ExportKeyAssigner:
             " in the export",
             hint="Rename the view or its group in the source, and import it again.",
         )
-
-    def _candidate_keys(self, group: Group, view: View) -> Iterator[str]:
-        yield view.key
-        yield prefix_view_key_with_group(group, view, self._glue)
-        stem = strip_image_suffix(view.key)
-        ending = view.key.removeprefix(stem)
-        digest = hashlib.sha256(f"{group.key}\0{view.key}".encode()).hexdigest()[:12]
-        yield f"{stem.replace('/', self._glue)}_{digest}{ending}"
 
     def _hash_names_and_owners(
         self, group: Group, view: View, splits: Mapping[str, str], key: str | None = None

@@ -332,7 +332,7 @@ def _read_given_cameras(
         report.add_problem(problem)
     shown, given = tree.shown(files[0]), dict[int, Camera]()
     for name, camera in cameras.items():
-        number = parse_camera_number(name)
+        number = parse_camera_number(PurePosixPath(name).name)
         if number is None:
             report.add_problem_at(
                 shown, name[:80], None, "has no camera number in its name; left out"

@@ -16,6 +16,7 @@ from app.formats.fields import parse_image_size
 from app.formats.file_tree import FileTree
 from app.formats.frame_names import (
     IMAGE_SUFFIXES,
+    compose_name,
     frame_path_by_match,
     map_frame_names_to_owners,
     view_file_path,
@@ -114,9 +115,10 @@ def map_line_file_names_to_owners(group: Group, view: View, split: str) -> Mappi
     """
     place = view_file_path(group, view)
     name = f"{make_split_folder_name(split, view.size)}/{flat_frame_name(place, split)}"
+    names = (compose_name(place).encode().hex(), name)
     if not view.station.shared:
-        return dict.fromkeys((place.encode().hex(), name), (group.key, view.key))
-    own = dict.fromkeys((place.encode().hex(), name), view.station.key)
+        return dict.fromkeys(names, (group.key, view.key))
+    own = dict.fromkeys(names, view.station.key)
     return {**own, **map_frame_names_to_owners(group, view, split)}
 
 

@@ -442,10 +442,14 @@ def score_camera_files(
 
 
 def _cameras_by_frame(cameras: Mapping[str, Camera]) -> dict[str, Camera]:
-    """Cameras by key, and by the bare name of the frame where only one has it."""
-    names = Counter(key.rsplit("/", 1)[-1] for key in cameras)
-    bare = {key.rsplit("/", 1)[-1]: camera for key, camera in cameras.items()}
-    return {**{name: bare[name] for name in bare if names[name] == 1}, **cameras}
+    """Cameras by key, and by each end of it, down to the name of the frame, that only one has."""
+    ends = [
+        (key.split("/", folders)[-1], camera)
+        for key, camera in cameras.items()
+        for folders in range(1, key.count("/") + 1)
+    ]
+    names = Counter(name for name, _ in ends)
+    return {**{name: camera for name, camera in ends if names[name] == 1}, **cameras}
 
 
 def _read_wrong_labels(findings: Path) -> set[tuple[str, str]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -12,6 +12,7 @@ from app.db.store import Store
 from app.features.datasets.service import get_dataset_head
 from app.features.groups.revision_queries import bump_group_revisions, refresh_inputs_hashes
 from app.features.groups.view_queries import (
+    StoredView,
     list_dataset_views,
     list_groups_of_station,
     read_stations,
@@ -20,11 +21,19 @@ from app.features.groups.view_queries import (
 from app.features.imports.ingest import IngestReport, open_import_session
 from app.features.queue.refresh_queries import refresh_queue
 from app.formats.camera_json import COVARIANCE, covariance_from_json
-from app.formats.frame_names import compose_name, strip_image_suffix
+from app.formats.frame_names import (
+    HolderFolders,
+    compose_name,
+    list_possible_export_keys,
+    strip_image_suffix,
+    view_file_path,
+    with_export_key,
+)
 from app.formats.report import ReaderReport
 from app.geometry.camera import Camera
 from app.soccer.codec import camera_to_json, covariance_to_json
 from app.soccer.frames import ImageSize
+from app.soccer.group import Group, Station, View
 from app.soccer.picture import size_centred_on_principal_point
 
 BATCH = 50
@@ -60,6 +69,7 @@ def import_given_cameras(
     size: ImageSize | None = None,
     sizes: Mapping[str, ImageSize] | None = None,
     covariances: Mapping[str, Any] | None = None,
+    top_folder: str = "",
     dry_run: bool = False,
     limit_report: ReaderReport | None = None,
 ) -> IngestReport:
@@ -67,7 +77,8 @@ def import_given_cameras(
 
     A name is the key of a static camera (``cam3``), the stem of a view (``7_1``, ``00002``), or
     ``<match>/<stem>`` or ``<group>/<stem>`` where a stem alone means views of several matches. Views
-    of one match that are called alike are one camera of a rig, and all of them get it.
+    of one match that are called alike are one camera of a rig, and all of them get it but those that
+    have a camera under a name of their own.
 
     Args:
         store: The database.
@@ -78,6 +89,7 @@ def import_given_cameras(
         size: Size of the images that the cameras were made for; None: that of each view.
         sizes: The same by name, where their files state it: they count before ``size``.
         covariances: How well they are known, by name, as ``read_cameras`` read it.
+        top_folder: The folder in which a zip file holds everything; it names nothing.
         dry_run: Dry run: report what would happen, change nothing.
         limit_report: What the files hold; hears of cameras that fit nothing, or views of several matches.
 
@@ -91,20 +103,20 @@ def import_given_cameras(
     found = get_dataset_head(store, dataset)
     report = IngestReport(left_out=ReaderReport() if limit_report is None else limit_report)
     with store.read() as session:
-        places = _read_stations_by_name(session, found.id)
-    known: list[tuple[NamedStation, GivenCamera]] = []
+        places = _StationNames.read(session, found.id, top_folder)
+    named: list[tuple[str, list[NamedStation]]] = []
     for name in sorted(cameras):
-        fitting = _find_stations_of_name(places, name)
-        matches = {place.match for place in fitting}
+        try:
+            named.append((name, places.find_stations(name)))
+        except ValueError as error:
+            report.left_out.add_problem_at(source, f'camera "{name}"', None, str(error))
+    known: list[tuple[NamedStation, GivenCamera]] = []
+    taken: dict[int, str] = {}
+    # A camera of one view counts before that of its rig.
+    for name, meant in sorted(named, key=lambda item: len(item[1])):
+        fitting = [place for place in meant if taken.setdefault(place.station, name) == name]
         if not fitting:
-            problem = f"no view has this name{_format_example_names(places)}"
-            report.left_out.add_problem_at(source, f'camera "{name}"', None, problem)
-            continue
-        if len(matches) > 1:
-            problem = (
-                f'views of {len(matches)} matches have this name; call it "{sorted(matches)[0]}/{name}", '
-                "or like the other match"
-            )
+            problem = f'is a second camera of its view; "{taken[meant[0].station]}" is used'
             report.left_out.add_problem_at(source, f'camera "{name}"', None, problem)
             continue
         if len(fitting) > 1:
@@ -129,42 +141,91 @@ def import_given_cameras(
     return report
 
 
-def _read_stations_by_name(session: Session, dataset_id: int) -> dict[str, list[NamedStation]]:
-    places: dict[str, list[NamedStation]] = {}
-    for row in list_dataset_views(session, dataset_id):
-        stem = strip_image_suffix(row.key)
-        own = row.group.removeprefix(f"{row.match}/") if row.match else row.group
-        names = (
-            {row.station}
-            if row.shared
-            # An export of views that several groups have puts the group before each.
-            else {stem, f"{row.match}/{stem}", f"{row.group}/{stem}", f"{row.match}/{own}/{stem}"}
-        )
+class _StationNames:
+    """The stations of a dataset by the names that files of cameras may have.
+
+    Args:
+        rows: The views of the dataset.
+        top_folder: A folder that names nothing.
+    """
+
+    def __init__(self, rows: Sequence[StoredView], top_folder: str):
+        self._places: dict[str, dict[int, NamedStation]] = {}
+        self._telling: set[str] = set()
+        """Names that tell the group or the match, whatever stands before them."""
+        self._top = top_folder
+        self._holders = HolderFolders(name for row in rows for name in (row.group, row.match))
+        for row in rows:
+            self._add(row, _list_own_names(row), f"{row.match}/" if row.match else None)
+        own = set(self._places)
+        for row in rows:
+            self._add(row, _list_names_with_group(row) - own, "")
+
+    @classmethod
+    def read(cls, session: Session, dataset_id: int, top_folder: str) -> _StationNames:
+        """The names of a dataset."""
+        return cls(list_dataset_views(session, dataset_id), compose_name(top_folder))
+
+    def _add(self, row: StoredView, names: Iterable[str], telling: str | None) -> None:
+        """Add names of a view; those that begin with ``telling`` tell the group or the match."""
         size = ImageSize(row.width, row.height)
         place = NamedStation(row.station_id, None if row.shared else row.group_id, row.match, size)
-        for name in map(compose_name, names):
-            known = places.setdefault(name, [])
-            if place not in known:
-                known.append(place)
-    return places
+        for name in names:
+            self._places.setdefault(name, {}).setdefault(place.station, place)
+            if telling is not None and name.startswith(compose_name(telling)):
+                self._telling.add(name)
 
+    def find_stations(self, name: str) -> list[NamedStation]:
+        """What a name means.
 
-def _find_stations_of_name(
-    places: Mapping[str, list[NamedStation]], name: str
-) -> list[NamedStation]:
-    """What a name means; folders before it do not matter where no match could be one of them."""
-    parts = compose_name(name).split("/")
-    for start in range(len(parts)):
-        found = places.get("/".join(parts[start:]), [])
-        if found and (start == 0 or not any(place.match for place in found)):
+        A folder that names neither group nor match does not matter where it holds files of any of
+        them (``HolderFolders``), or only one view has the name.
+
+        Raises:
+            ValueError: It means nothing, or views of several matches; a message for people.
+        """
+        parts = compose_name(name).split("/")
+        for start in range(len(parts)):
+            known = "/".join(parts[start:])
+            if known not in self._places:
+                continue
+            found = list(self._places[known].values())
+            folders = parts[parts[0] == self._top : start]
+            others = self._holders.find_other_folders(folders)
+            # Three of them may be the league, season and match of another one.
+            alone = len(found) == 1 and (len(folders) < 3 or not found[0].match)
+            if others and not alone and known not in self._telling:
+                raise ValueError(f'folder "{others[-1]}" names no group or match')
+            if len(matches := sorted({place.match for place in found})) > 1:
+                raise ValueError(
+                    f'views of {len(matches)} matches have this name; call it "{matches[0]}/{known}",'
+                    " or like the other match"
+                )
             return found
-    return []
+        raise ValueError(f"no view has this name{self._format_example_names()}")
+
+    def _format_example_names(self) -> str:
+        names = [f'"{name}"' for name in sorted(self._places) if "/" not in name]
+        more = " and more" if len(names) > EXAMPLES else ""
+        return f"; views are called {', '.join(names[:EXAMPLES])}{more}" if names else ""
 
 
-def _format_example_names(places: Mapping[str, list[NamedStation]]) -> str:
-    names = [f'"{name}"' for name in sorted(places) if "/" not in name]
-    more = " and more" if len(names) > EXAMPLES else ""
-    return f"; views are called {', '.join(names[:EXAMPLES])}{more}" if names else ""
+def _list_own_names(row: StoredView) -> set[str]:
+    """Stem of a view or key of a static camera, alone and with the folders of its match before it."""
+    stem = row.station if row.shared else strip_image_suffix(row.key)
+    folders = row.match.split("/") if row.match else []
+    names = ("/".join((*folders[start:], stem)) for start in range(len(folders) + 1))
+    return set(map(compose_name, names))
+
+
+def _list_names_with_group(row: StoredView) -> set[str]:
+    """Names that tell the group of a view, and those of its files in an export beside others."""
+    station = Station(row.station, ImageSize(row.width, row.height), shared=row.shared)
+    view = View(row.key, station)
+    group = Group(row.group, (view,), match=row.match)
+    _, *called = list_possible_export_keys(group, view)
+    names = {view_file_path(group, with_export_key(view, key)) for key in called}
+    return set(map(compose_name, (*names, f"{row.group}/{strip_image_suffix(row.key)}")))
 
 
 def _scale_camera(camera: Camera, made_for: ImageSize | None, size: ImageSize) -> Camera:

@@ -339,6 +339,7 @@ def import_source(
             size=source.size,
             sizes=sizes,
             covariances=covariances,
+            top_folder=source.path.stem,
             dry_run=dry_run,
             limit_report=report,
         )

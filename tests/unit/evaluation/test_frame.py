@@ -86,7 +86,7 @@ class TestFind:
         other = "league/2030-2031/2030-09-01 - 18-00 Fir 1 - 0 Oak/7_1.png"
         assert names.find(other) is None
         assert names.explain_unknown_name(other).startswith(
-            "is not a frame of the dataset: its folders name none"
+            "is not a frame of the dataset: its folders name no group"
         )
         assert names.explain_unknown_name("99.png") == "is not a frame of the dataset"
 
@@ -180,4 +180,20 @@ class TestFindNumber:
         self, pictures: FrameNameIndex
     ) -> None:
         assert pictures.find_station_frames("south") == (2, 4, 5)
-        assert pictures.find_station_frames("north") == ()
+
+    def test_a_folder_that_names_no_group_is_passed_over_where_it_holds_files_of_any(
+        self, pictures: FrameNameIndex
+    ) -> None:
+        for name in ("cameras/south", "run/south", "test-960x540/camera/south"):
+            assert pictures.find_station_frames(name, "run") == (2, 4, 5), name
+        for name in ("kick99/south", "run/kick99/south"):
+            assert pictures.find_station_frames(name, "run") == (), name
+            assert "name no group or match" in pictures.explain_unknown_name(name)
+        assert pictures.find("kick1/south").id == 4
+        assert pictures.find_station_frames("clip/north") == (1,)
+
+    def test_a_numbered_folder_names_a_group_where_groups_are_called_so(self) -> None:
+        frames = [NamedFrame(n, f"frame_{n}", "south", "", SIZE) for n in (1, 2)]
+        index = FrameNameIndex.of(frames)
+        assert index.find_station_frames("frame_99/south") == ()
+        assert index.find_station_frames("run3/frames/south") == (1, 2)

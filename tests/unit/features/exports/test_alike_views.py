@@ -17,6 +17,7 @@ import pytest
 import touchline
 from app.errors import InputError
 from app.evaluation.frame import FrameNameIndex, NamedFrame
+from app.evaluation.prediction_files import read_predicted_cameras
 from app.features.exports.service import ExportReport, export_dataset, require_exportable
 from app.features.groups.submit import load_group_state
 from app.features.imports.cameras import import_given_cameras
@@ -299,16 +300,48 @@ class TestEveryFormat:
             assert (report.counts["images"], report.counts["pictures"]) == (3, 2)
 
 
-class TestWhatIsWrittenIsFoundAgain:
-    def test_cameras_fit_the_views_that_they_are_of(self, store, fill, tmp_path: Path) -> None:
-        fill(*made("alike", tmp_path / "in"))
-        for name in ("cameras", "sn-calibration"):
-            export_dataset(store, "demo", name, tmp_path / name, everything=True)
-            cameras = read_cameras(tmp_path / name, ReaderReport())
-            report = import_given_cameras(store, "demo", cameras, source="x", actor="ann")
-            assert (report.unchanged, report.changed, report.problems) == (6, 0, [])
+TOLD_APART = [scheme for scheme in SCHEMES if scheme != "alike but for the ending"]
+"""Where the name of a file without its ending means one frame."""
 
-    @pytest.mark.parametrize("scheme", ["alike", "alike in a match"])
+
+def index_frames(groups: Sequence[Group]) -> FrameNameIndex:
+    """The frames of a dataset, each with its number as its id."""
+    views = [(group, view) for group in groups for view in group.views]
+    return FrameNameIndex.of(
+        NamedFrame(number, group.key, view.key, group.match, SIZE)
+        for number, (group, view) in enumerate(views)
+    )
+
+
+class TestWhatIsWrittenIsFoundAgain:
+    @pytest.mark.parametrize("scheme", TOLD_APART)
+    @pytest.mark.parametrize("name", ["cameras", "sn-calibration"])
+    def test_cameras_fit_the_views_that_they_are_of(
+        self, store, fill, tmp_path: Path, name: str, scheme: str
+    ) -> None:
+        groups = made(scheme, tmp_path / "in")
+        fill(*groups)
+        export_dataset(store, "demo", name, tmp_path / name, everything=True)
+        count = sum(len(group.views) for group in groups)
+        cameras = read_cameras(tmp_path / name, ReaderReport())
+        report = import_given_cameras(store, "demo", cameras, source="x", actor="ann")
+        assert report.left_out.problems == []
+        assert (report.unchanged, report.changed, report.problems) == (count, 0, [])
+        # A camera means its own view whatever lies beside it.
+        for key, camera in cameras.items():
+            report = import_given_cameras(store, "demo", {key: camera}, source="x", actor="ann")
+            assert (report.unchanged, report.changed, report.problems) == (1, 0, []), key
+        known = index_frames(groups)
+        found = read_predicted_cameras(tmp_path / name, known)
+        assert (found.unknown, found.report.problems) == ({}, [])
+        views = [view for group in groups for view in group.views]
+        assert {
+            number: camera.position[2].item() for number, camera in found.cameras.items()
+        } == pytest.approx(
+            {number: view.station.given.position[2] for number, view in enumerate(views)}
+        )
+
+    @pytest.mark.parametrize("scheme", TOLD_APART)
     @pytest.mark.parametrize("name", ["coco", "gamestate", "sn-calibration", "yolo"])
     def test_predictions_may_call_a_frame_as_an_export_does(
         self, store, fill, tmp_path: Path, name: str, scheme: str
@@ -316,11 +349,7 @@ class TestWhatIsWrittenIsFoundAgain:
         groups = made(scheme, tmp_path / "in")
         fill(*groups)
         export_dataset(store, "demo", name, tmp_path / "out", everything=True, images="copy")
-        views = [(group, view) for group in groups for view in group.views]
-        known = FrameNameIndex.of(
-            NamedFrame(number, group.key, view.key, group.match, SIZE)
-            for number, (group, view) in enumerate(views)
-        )
+        known = index_frames(groups)
         for file in filter(is_picture, on_disk(tmp_path / "out")):
             found = known.find(file)
             assert found is not None, known.explain_unknown_name(file)

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import unicodedata
+import zipfile
 from dataclasses import replace
 
 import numpy as np
@@ -23,6 +24,7 @@ from app.formats.camera_json import covariance_to_json
 from app.formats.cameras import format_camera_file
 from app.geometry.arrays import flatten_covariance
 from app.soccer.frames import ImageSize
+from app.soccer.group import Group
 from tests.cameras import FULL_HD
 
 
@@ -168,6 +170,57 @@ class TestIngestCameras:
             load_group_state(store, each).group.view("7.png").station.given == opposite
             for each in ids
         )
+
+    def test_a_camera_in_the_folder_of_a_group_is_that_of_its_view_alone(
+        self, store, fill, make_group, opposite
+    ) -> None:
+        views = make_group(7).views
+        bare = [replace(view, station=replace(view.station, given=None)) for view in views]
+        keys = ("a", "b", "c")
+        groups = [
+            Group(key, tuple(
+                replace(view, station=replace(view.station, key=f"{key}/{view.key}"))
+                for view in bare
+            ))
+            for key in keys
+        ]  # fmt: skip
+        ids = dict(zip(keys, fill(*groups, solved=False), strict=True))
+
+        def list_groups_with_camera():
+            states = {key: load_group_state(store, each) for key, each in ids.items()}
+            given = {key: state.group.view("7.png").station.given for key, state in states.items()}
+            return {key: camera.skew for key, camera in given.items() if camera is not None}
+
+        report = attach(store, {"a/7": replace(opposite, skew=1.0)})
+        assert (report.changed, report.problems) == (1, [])
+        assert list_groups_with_camera() == {"a": 1.0}
+        report = attach(store, {"d/7": opposite, "cameras/d/7": opposite})
+        assert (report.changed, list_groups_with_camera()) == (0, {"a": 1.0})
+        assert {error.problem for error in report.left_out.problems} == {
+            'folder "d" names no group or match'
+        }
+        # A camera of one view counts before that of its rig.
+        rig = {"b/7": replace(opposite, skew=2.0), "cameras/7": replace(opposite, skew=3.0)}
+        report = attach(store, rig)
+        assert report.problems == ['camera "cameras/7" belongs to 2 views of this name']
+        assert list_groups_with_camera() == {"a": 3.0, "b": 2.0, "c": 3.0}
+        report = attach(store, {"a/7": opposite, "x/a/7": opposite})
+        assert [error.problem for error in report.left_out.problems] == [
+            'is a second camera of its view; "a/7" is used'
+        ]
+
+    @pytest.mark.parametrize(("name", "changed"), [("rig.zip", 2), ("other.zip", 0)])
+    def test_the_folder_of_a_zip_file_names_nothing(
+        self, store, fill, make_group, tmp_path, opposite, name, changed
+    ) -> None:
+        first = make_group(7)
+        other = replace(first.views[0], station=replace(first.views[0].station, key="x"))
+        fill(first, Group("x", (other,), match=first.match), solved=False)
+        path = tmp_path / name
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("rig/camera_7.json", format_camera_file(opposite))
+        source = ImportSource("cameras", path)
+        assert import_source(store, "demo", source, store.settings).result.changed == changed
 
     def test_cameras_of_another_size_are_scaled_to_their_views(
         self, store, state, opposite
