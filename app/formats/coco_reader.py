@@ -44,9 +44,14 @@ from app.formats.safe_path import require_safe_path
 from app.formats.split_names import UNASSIGNED
 from app.formats.synloc import camera_from_synloc, is_synloc_image_record
 from app.formats.trees import open_tree_context
-from app.formats.view_state import GroupAssembler, RecordFieldReader, ViewWithGroupHead
+from app.formats.view_state import (
+    GroupAssembler,
+    RecordFieldReader,
+    ViewWithGroupHead,
+    extras_from_json,
+)
 from app.geometry.camera import Camera
-from app.soccer.annotation import BallAnnotation, Extras
+from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box, box_from_corner_origin
 from app.soccer.group import Group, Media, View
 from app.wording import plural
@@ -217,7 +222,7 @@ class _CocoFileReader:
 
     def _read_image_of_our_export(self, image: RecordFieldReader, index: int) -> ViewWithGroupHead:
         state = RecordFieldReader(image.value[STATE], self.path, image.record)
-        view = state.read_view(image.read_size(), Extras())
+        view = state.read_view(image.read_size(), extras_from_json(state.value.get("extras")))
         changed = self._apply_box_changes(index, view, state.value.get(ORIGIN) == CORNER)
         media = self._find_media_of_our_export(image.read_short_text("file_name", ""))
         view = replace(view, balls=changed, media=media)

@@ -18,6 +18,7 @@ from app.formats.export_record import ExportRecord, choose_ball_box, find_export
 from app.formats.split_names import split_in_file_name
 from app.formats.view_state import group_head_to_json, view_to_json
 from app.json_text import json_text
+from app.soccer.annotation import Extras
 from app.soccer.frames import Box, box_to_corner_origin
 from app.soccer.group import View
 from app.soccer.solution import GAMMAS_PERCENT, BallFit
@@ -143,9 +144,16 @@ def _image_to_json(
             **group_head_to_json(record.group),
             "position": record.group.views.index(view),
             **view_to_json(view),
+            **_extras_to_json(view.extras),
             ORIGIN: CORNER,
         },
     }
+
+
+def _extras_to_json(extras: Extras) -> dict[str, Any]:
+    """What was annotated beside ball and markings, where there is any."""
+    value = Extras(extras.boxes, extras.lines).to_plain_values()
+    return {} if value is None else {"extras": value}
 
 
 def _jac_by_tolerance(jac: Sequence[float]) -> dict[str, float]:

@@ -12,7 +12,7 @@ from app.formats.coco_reader import read_coco
 from app.formats.coco_writer import write_coco
 from app.formats.export_record import ExportRecord
 from app.formats.report import ReaderReport
-from app.soccer.annotation import BallAnnotation
+from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box, ImageSize
 from app.soccer.group import Group
 from tests.unit.formats.foreign_coco import ball, coco, image, write
@@ -290,6 +290,18 @@ class TestReadCoco:
         path.write_text(json.dumps(value))
         assert list(read_coco(tmp_path, report)) == []
         assert [item.record for item in report.problems] == [f"images[{n}]" for n in range(3)]
+
+    def test_boxes_and_lines_beside_the_ball_come_back(
+        self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
+    ) -> None:
+        person = {"class": "person", "ID": "2", "points": {"x1": 1.5, "y1": 2, "x2": 3, "y2": 4}}
+        line = {"class": "Line unknown", "points": [1.0, 2.0, 3.0, 4.0]}
+        group = soccer_group(replays=1)
+        view = replace(group.views[0], extras=Extras((person,), (line,)))
+        write_coco(tmp_path, [solved(group.with_view(view))])
+        (again,) = read_coco(tmp_path, report)
+        assert [found.extras for found in again.views] == [view.extras, group.views[1].extras]
+        assert report.problems == []
 
     def test_views_outside_come_back_to_their_group(
         self, tmp_path: Path, solved: Solved, soccer_group: Make, report: ReaderReport
