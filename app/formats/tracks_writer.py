@@ -151,12 +151,12 @@ def write_tracks(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
     One track lies below ``root`` itself, several have a folder each, called by their keys.
 
     Returns:
-        Counts: ``tracks``, ``frames``, ``balls`` (frames with a place) and ``events``.
+        Counts: ``tracks``, ``frames``, ``frames_with_ball`` (those with a place) and ``events``.
 
     Raises:
         InputError: Two tracks would have one folder.
     """
-    counts = {"tracks": 0, "frames": 0, "balls": 0, "events": 0}
+    counts = {"tracks": 0, "frames": 0, "frames_with_ball": 0, "events": 0}
     for folder, record in create_track_folders(root, records):
         track = record.track
         lines = [format_csv_line(COLUMNS), *map(format_csv_line, _track_rows(record))]
@@ -167,7 +167,7 @@ def write_tracks(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
             _write_parquet(folder / "ball.parquet", record)
         counts["tracks"] += 1
         counts["frames"] += len(track.frames)
-        counts["balls"] += int(record.has_position.sum())
+        counts["frames_with_ball"] += int(record.has_position.sum())
         counts["events"] += len(track.events)
     return counts
 
@@ -181,9 +181,9 @@ def write_track_arrays(root: Path, records: Iterable[TrackRecord]) -> dict[str, 
     it has no camera.
 
     Returns:
-        Counts: ``tracks``, ``frames``, ``balls`` and ``cameras`` (views that have one).
+        Counts: ``tracks``, ``frames``, ``frames_with_ball`` and ``cameras`` (views that have one).
     """
-    counts = {"tracks": 0, "frames": 0, "balls": 0, "cameras": 0}
+    counts = {"tracks": 0, "frames": 0, "frames_with_ball": 0, "cameras": 0}
     for folder, record in create_track_folders(root, records):
         track = record.track
         rows = {int(frame): row for row, frame in enumerate(track.frames)}
@@ -205,7 +205,7 @@ def write_track_arrays(root: Path, records: Iterable[TrackRecord]) -> dict[str, 
             np.savez_compressed(file, **arrays)
         counts["tracks"] += 1
         counts["frames"] += len(rows)
-        counts["balls"] += int(record.has_position.sum())
+        counts["frames_with_ball"] += int(record.has_position.sum())
     return counts
 
 
@@ -343,11 +343,11 @@ def write_tracab(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
     nobody in possession either, so that ``H`` stands there. A rate that is not a whole number is rounded.
 
     Returns:
-        Counts: ``tracks``, ``frames`` and ``balls``.
+        Counts: ``tracks``, ``frames`` and ``frames_with_ball``.
 
     Source: TRACAB's file specification as kloppy reads it (``TracabDatParser``).
     """
-    counts = {"tracks": 0, "frames": 0, "balls": 0}
+    counts = {"tracks": 0, "frames": 0, "frames_with_ball": 0}
     for folder, record in create_track_folders(root, records):
         track, lines = record.track, []
         speed = np.linalg.norm(track.velocity, axis=1)
@@ -359,7 +359,7 @@ def write_tracab(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
         (folder / METADATA).write_text(_format_tracab_metadata(record), encoding="utf-8")
         counts["tracks"] += 1
         counts["frames"] += len(track.frames)
-        counts["balls"] += len(lines)
+        counts["frames_with_ball"] += len(lines)
     return counts
 
 
@@ -372,17 +372,17 @@ def write_cdf(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
     have no players.
 
     Returns:
-        Counts: ``tracks``, ``frames`` and ``balls``.
+        Counts: ``tracks``, ``frames`` and ``frames_with_ball``.
 
     Source: Common Data Format 0.3.2 (arXiv 2505.15820), tracking.
     """
-    counts = {"tracks": 0, "frames": 0, "balls": 0}
+    counts = {"tracks": 0, "frames": 0, "frames_with_ball": 0}
     for folder, record in create_track_folders(root, records):
         lines = [f"{json_text(line)}\n" for line in _make_cdf_frames(record)]
         (folder / CDF).write_text("".join(lines), encoding="utf-8")
         counts["tracks"] += 1
         counts["frames"] += len(record.track.frames)
-        counts["balls"] += len(lines)
+        counts["frames_with_ball"] += len(lines)
     return counts
 
 

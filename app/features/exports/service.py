@@ -455,6 +455,7 @@ class _ExportRun:
         self._licences: set[str] = set()
         self._verdicts: Counter[str] = Counter()
         self._overrides: list[dict[str, str | None]] = []
+        self._balls = 0
         self.unassigned: Iterable[FramePersons] = ()
         self.tracks: TrackSource | None = None
         self.kept: Sequence[TrackRecord] = ()
@@ -480,7 +481,10 @@ class _ExportRun:
             None if self.tracks is None else self.tracks.make_track_records,
             self.kept,
         )
-        return write_format(root, self._iterate_records(), wanted, put)
+        counts = write_format(root, self._iterate_records(), wanted, put)
+        if self.tracks is None:
+            counts.setdefault("balls", self._balls)
+        return counts
 
     def manifest(self, counts: Mapping[str, int]) -> Manifest:
         """The manifest of this export."""
@@ -514,6 +518,7 @@ class _ExportRun:
         options = self._options
         for place, (found, facts) in enumerate(self._source.items(), 1):
             record = found
+            self._balls += sum(map(found.has_ball_3d, found.group.views))
             if options.format == "yolo":
                 # A frame without its label would teach that it shows no ball: it stays out as well.
                 record = found.keep_training_views(options.boxes, options.includes_every_view)

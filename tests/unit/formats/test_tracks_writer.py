@@ -73,7 +73,7 @@ class TestPositionSigma:
 class TestWriteTracks:
     def test_a_row_a_frame_empty_where_there_is_a_gap(self, tmp_path: Path) -> None:
         counts = write_tracks(tmp_path, [record()])
-        assert counts == {"tracks": 1, "frames": 4, "balls": 3, "events": 1}
+        assert counts == {"tracks": 1, "frames": 4, "frames_with_ball": 3, "events": 1}
         text = (tmp_path / "ball.csv").read_text().splitlines()
         assert text[0] == "frame,time_s,x_m,y_m,z_m,sigma_m,state,cameras"
         assert text[1] == "100,4.0,0.0,-2.0,-0.11,0.3,measured,cam3 cam4"
@@ -123,7 +123,7 @@ class TestWriteTrackArrays:
     def test_ball_and_cameras_are_z_up_with_a_row_a_frame(self, tmp_path: Path) -> None:
         cameras = {"cam1": dict.fromkeys((100, 102), TRUTH["cam1"]), "cam2": {}}
         counts = write_track_arrays(tmp_path, [record(cameras=cameras)])
-        assert counts == {"tracks": 1, "frames": 4, "balls": 3, "cameras": 1}
+        assert counts == {"tracks": 1, "frames": 4, "frames_with_ball": 3, "cameras": 1}
         found = np.load(tmp_path / "ball.npz")
         assert found["frame"].tolist() == [100, 101, 102, 103]
         assert found["ball"][0].tolist() == [0.0, 2.0, 0.11]
@@ -195,7 +195,11 @@ class TestWriteTracab:
     def test_kloppy_reads_the_ball_within_a_centimetre(
         self, flight_record: TrackRecord, tmp_path: Path
     ) -> None:
-        assert write_tracab(tmp_path, [flight_record]) == {"tracks": 1, "frames": 60, "balls": 58}
+        assert write_tracab(tmp_path, [flight_record]) == {
+            "tracks": 1,
+            "frames": 60,
+            "frames_with_ball": 58,
+        }
         found = read_by(KLOPPY, tmp_path, tmp_path)
         assert found["rate"] == 25
         assert np.allclose(found["pitch"], [104.0, 67.0])
@@ -210,7 +214,11 @@ class TestWriteTracab:
 
 class TestWriteCdf:
     def test_its_validator_is_silent(self, flight_record: TrackRecord, tmp_path: Path) -> None:
-        assert write_cdf(tmp_path, [flight_record]) == {"tracks": 1, "frames": 60, "balls": 58}
+        assert write_cdf(tmp_path, [flight_record]) == {
+            "tracks": 1,
+            "frames": 60,
+            "frames_with_ball": 58,
+        }
         assert read_by(VALIDATOR, tmp_path, tmp_path) == {"valid": True, "raised": []}
 
     def test_the_ball_is_z_up_and_frames_in_gaps_are_left_out(
@@ -230,5 +238,5 @@ class TestWriteCdf:
         position = flight_record.track.position.copy()
         position[5, 1] = 43.0
         far = replace(flight_record, track=replace(flight_record.track, position=position))
-        assert write_cdf(tmp_path, [far])["balls"] == 57
+        assert write_cdf(tmp_path, [far])["frames_with_ball"] == 57
         assert read_by(VALIDATOR, tmp_path, tmp_path) == {"valid": True, "raised": []}

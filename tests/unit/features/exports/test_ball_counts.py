@@ -107,6 +107,14 @@ class TestCounts:
         named = manifest["counts"].get("boxes", manifest["counts"].get("annotations", expected))
         assert named == expected
 
+    @pytest.mark.parametrize("format_", ["soccernet-v3", "cameras", "sn-calibration", "gamestate"])
+    def test_formats_without_3d_balls_count_them_all_the_same(
+        self, mixed: Store, tmp_path: Path, format_: str
+    ) -> None:
+        report = export_dataset(mixed, "demo", format_, tmp_path / "out", version="v1")
+        manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
+        assert manifest["counts"]["balls"] == report.counts["balls"] == 4
+
     @pytest.mark.parametrize("format_", ["coco", "yolo"])
     def test_detectors_learn_from_the_view_apart_where_that_is_asked(
         self, mixed: Store, tmp_path: Path, format_: str
@@ -142,7 +150,7 @@ class TestCounts:
         fill(make_static(10), make_static(11))
         freeze_dataset(store, "demo", FreezeRequest("v1", groups="passing"), actor="ann")
         version = find_version(store, get_dataset(store, "demo").id, "v1")
-        for name in ("issia-3d", "coco", "parquet", "yolo"):
+        for name in ("issia", "issia-3d", "coco", "parquet", "yolo"):
             report = export_dataset(store, "demo", name, tmp_path / name, version="v1")
             assert report.counts["balls"] == version.counts["balls"] == 6
 
