@@ -211,8 +211,8 @@ def read_predicted_cameras(
         camera = cameras[name]
         ids = [identity for identity in meant[name] if identity not in found.cameras]
         if meant[name] and not ids:
-            problem = "is a second camera of its view; the first one is used"
-            found.report.add_problem_at(path.name, name, None, problem)
+            message = "is a second camera of its view; the first one is used"
+            found.report.add_problem_at(path.name, name, None, message)
         for identity in ids:
             annotated = names.frames[identity].size
             made_for = sizes.get(name) or size

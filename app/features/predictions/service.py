@@ -42,6 +42,7 @@ from app.json_text import canonical_json_text, quote_text
 from app.object_store.path import split_pinned_address
 from app.soccer.frames import ImageSize
 from app.soccer.group import Media
+from app.wording import plural
 
 LISTED = 100
 """Unknown frames and problems that a report names; all are counted."""
@@ -301,9 +302,17 @@ def _unknown_frames_error(
     unknown, reasons = boxes.unknown + cameras.unknown, {**boxes.reasons, **cameras.reasons}
     first = sorted(unknown)
     others = f" (also {', '.join(map(quote_text, first[1:3]))})" if first[1:] else ""
+    problems = [*boxes.report.problems, *cameras.report.problems]
+    count = len(problems) + boxes.report.dropped + cameras.report.dropped
+    # Of frames that the dataset may have.
+    unread = (
+        f"; {plural(count, 'record')} could not be read, the first: {problems[0].message}"
+        if problems
+        else ""
+    )
     return InputError(
-        f"none of the {len(unknown)} frames belongs to the dataset: {quote_text(first[0], 80)} "
-        f"{reasons[first[0]]}{others}",
+        f"none of the {len(unknown)} frames that could be read belongs to the dataset: "
+        f"{quote_text(first[0], 80)} {reasons[first[0]]}{others}{unread}",
         hint=f"Frames of the dataset are called {', '.join(map(quote_text, names.list_example_names()))}, with their match "
         "before them where several have one of that name, or as an export calls them.",
     )

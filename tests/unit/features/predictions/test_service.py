@@ -108,11 +108,28 @@ class TestAddPredictions:
         assert get_predictions(store, first.id) == first
 
     def test_a_file_for_another_dataset_is_refused(self, store, state, tmp_path) -> None:
-        with pytest.raises(InputError, match="none of the 2 frames belongs"):
+        with pytest.raises(InputError, match="none of the 2 frames that could be read belongs"):
             add_predictions(
                 store, "demo", "x", results(tmp_path / "y.json", "8.png", "9.png"), actor="ann"
             )
         assert list_prediction_sets(store, "demo") == []
+
+    def test_records_that_cannot_be_read_are_named_where_no_frame_is_known(
+        self, store, state, tmp_path
+    ) -> None:
+        path = tmp_path / "y.json"
+        boxes = {"7.png": [1, 2, 3], "8.png": [1, 2, 3, 4], "7_1.png": [1, 2]}
+        path.write_text(json.dumps([
+            {"file_name": name, "category_id": 1, "bbox": box, "score": 0.5}
+            for name, box in boxes.items()
+        ]))  # fmt: skip
+        with pytest.raises(InputError) as caught:
+            add_predictions(store, "demo", "x", PredictionFiles(path), actor="ann")
+        assert 'none of the 1 frames that could be read belongs to the dataset: "8.png"' in str(
+            caught.value
+        )
+        assert "2 records could not be read, the first: " in str(caught.value)
+        assert "result 0, bbox: has 3" in str(caught.value)
 
     @pytest.mark.parametrize("name", ["", "../x", "a/b", "ü", "x" * 101])
     def test_a_name_that_no_file_could_have_is_refused(self, store, state, tmp_path, name) -> None:
