@@ -23,9 +23,11 @@ export function sizeText(bytes) {
 
 const ELSEWHERE = 'Add it on the page Recordings: Touchline finds its shots there, and frames that you choose become groups.';
 
-/** One file to send: the only one as it is, several in a zip. @param {PathFile[]} files @param {AbortSignal} signal */
+/** One file to send: the only one as it is, several in a zip, as one in folders. @param {PathFile[]} files @param {AbortSignal} signal */
 async function toSend(files, signal) {
-	if (files.length === 1) return files[0].file;
+	// A folder inside the chosen one may name a group; a zip names its own.
+	const [{ path, file }] = files;
+	if (files.length === 1 && (path.split('/').length < 3 || /\.zip$/i.test(path))) return file;
 	const top = files[0].path.split('/')[0];
 	const folder = files.every(({ path }) => path.startsWith(`${top}/`)) ? top : 'files';
 	return packFiles(files, `${folder}.zip`, signal);

@@ -118,6 +118,19 @@ class TestPictures:
             "stills/second half/2.jpg",
         ]
 
+    def test_the_only_file_of_a_folder_keeps_the_folder_inside_it(
+        self, stills: Path, open_page: OpenPage
+    ) -> None:
+        (stills / "1.png").unlink()
+        page = open_page("/import")
+        page.get_by_label("Dataset", exact=True).fill("stills")
+        page.set_input_files("#import-folder", stills)
+        expect(page.get_by_text("stills.zip, ")).to_contain_text("is uploaded")
+        page.get_by_role("button", name="Import", exact=True).click()
+        expect(page.get_by_role("region", name="What happened")).to_be_visible()
+        (group,) = page.request.get("/api/v1/groups?dataset=stills").json()["items"]
+        assert group["key"] == "stills/second half/2.jpg"
+
     def test_that_are_dropped_become_one_group_and_the_room_of_uploads_is_said(
         self, stills: Path, open_page: OpenPage
     ) -> None:
