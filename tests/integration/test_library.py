@@ -64,7 +64,7 @@ class TestOpen:
         (kept,) = (cache / "versions").iterdir()
         assert kept.name.startswith(frozen["hash"])
         before = kept.stat().st_mtime_ns
-        again = library.open(address, frozen["hash"][:12], dataset="small", cache=cache)
+        again = library.open(library.Client(address), frozen["hash"][:12], dataset="small", cache=cache)
         assert (again.groups, kept.stat().st_mtime_ns) == (version.groups, before)
 
     def test_nothing_is_left_on_the_server(
