@@ -50,14 +50,12 @@ def format_pixels(value: float) -> str:
 
     Example:
         >>> format_pixels(7.26), format_pixels(241.1), format_pixels(1720.0), format_pixels(31_000.0)
-        ('7.3 px', '241 px', '1.7k px', '>20k px')
+        ('7.3 px', '241 px', '1,720 px', '>20,000 px')
     """
     size = abs(value)
     if size >= _BEYOND_PX:
-        return ">20k px"
-    if size >= 999.5:
-        return f"{value / 1000:.{0 if size >= 9950 else 1}f}k px"
-    return f"{value:.{0 if size >= 99.95 else 1}f} px"
+        return f">{_BEYOND_PX:,} px"
+    return f"{value:,.{0 if size >= 99.95 else 1}f} px"
 
 
 def format_percent(value: float) -> str:

@@ -69,9 +69,9 @@ class TestNumbers:
             (99.94, "99.9 px"),
             (99.96, "100 px"),
             (241.1, "241 px"),
-            (1720.0, "1.7k px"),
-            (9960.0, "10k px"),
-            (25_000.0, ">20k px"),
+            (1720.0, "1,720 px"),
+            (9960.0, "9,960 px"),
+            (25_000.0, ">20,000 px"),
         ],
     )
     def test_pixels_need_four_characters(self, value: float, shown: str) -> None:
