@@ -18,7 +18,7 @@ import { hitTest } from './hit.js';
  * @property {() => Viewport} viewport
  * @property {() => Selection | null} selected
  * @property {() => boolean} enabled whether things can be taken hold of
- * @property {() => 'ball' | 'line' | null} draws what a click draws
+ * @property {() => {marking: string} | null} draws what a click draws; a ball has no marking
  * @property {() => PredictionAt | undefined} predictionAt
  * @property {(hit: Hit | null) => string} hint what is said of the thing under the pointer
  * @property {(at: ImagePoint) => void} draw
@@ -39,9 +39,11 @@ export function attachPointer(element, panel) {
 	/** @param {ScreenPoint} place */
 	function hitAt(place) {
 		if (!panel.enabled()) return null;
-		// Where clicks draw, what is predicted is drawn over.
-		const predictionAt = panel.draws() ? undefined : panel.predictionAt();
-		return hitTest(panel.view(), panel.viewport(), place, panel.selected(), predictionAt);
+		const [view, drawn] = [panel.view(), panel.draws()];
+		if (!drawn) return hitTest(view, panel.viewport(), place, panel.selected(), panel.predictionAt());
+		// Markings meet, a ball may lie on one, and what is predicted is drawn over: only the marking's own points are moved.
+		const { [drawn.marking]: points = [] } = view.lines;
+		return hitTest({ ...view, balls: [], lines: { [drawn.marking]: points } }, panel.viewport(), place, null);
 	}
 
 	/** @param {ScreenPoint} start @param {PointerEvent} event @returns {Press | null} */
@@ -55,8 +57,7 @@ export function attachPointer(element, panel) {
 			return null;
 		}
 		const drawn = panel.draws();
-		// A ball may lie on a line's point; a point beside another one is rather moved than doubled.
-		const hit = drawn === 'ball' ? null : hitAt(start);
+		const hit = hitAt(start);
 		if (drawn && !hit) return { drag: null, click: panel.draw };
 		panel.select(hit);
 		return { drag: hit && dragOf(panel.view(), hit, toImage(panel.viewport(), start)) };

@@ -37,7 +37,9 @@ export function ClassChooser({ picture }) {
 	const [at, setAt] = useState(0);
 	const all = useMemo(() => choicesOf(picture), [picture.view.key, picture.view.lines]);
 	const wanted = text.toLowerCase().split(/\s+/);
-	const found = all.filter(({ name, plain }) => wanted.every((word) => `${name} ${plain}`.toLowerCase().includes(word)));
+	const has = (/** @type {string} */ words) => wanted.every((word) => words.toLowerCase().includes(word));
+	// Those with the words in their name come first.
+	const found = all.filter(({ name, plain }) => has(`${name} ${plain}`)).toSorted((a, b) => Number(has(b.name)) - Number(has(a.name)));
 	const active = Math.min(at, found.length - 1);
 	const { letter } = picture.view;
 	// Before the next key: who types at once must not find the letters doing something else.

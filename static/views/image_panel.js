@@ -105,7 +105,7 @@ export function ImagePanel({ picture, area, sizes }) {
 			enabled: () => !overlaysHidden.value && !latestProps.current.elsewhere && !isSmall(),
 			draws: () => {
 				const present = drawing.value;
-				return present?.view === latestProps.current.view.key && present.what !== 'ask' ? present.what : null;
+				return present?.view === latestProps.current.view.key && present.what !== 'ask' ? present : null;
 			},
 			predictionAt: () => (boxes.value ? latestProps.current.predictions?.at : undefined),
 			hint: (hit) => hintOf(latestProps.current.predictions, hit),

@@ -77,6 +77,44 @@ class TestDrawing:
         expect(choice).to_contain_text("arc of the right penalty area")
         screen.press("Escape")
 
+    def test_a_marking_whose_name_has_the_words_comes_before_one_in_whose_description_they_are(
+        self, review: Review
+    ) -> None:
+        screen = review(1)
+        for words, marking in (("side top", "Side line top"), ("side left", "Side line left")):
+            screen.press("n")
+            screen.page.keyboard.type(words)
+            expect(screen.page.locator(".chooser__choice").nth(1)).to_contain_text("Big rect.")
+            screen.press("Enter")
+            expect(screen.page.locator(".drawing-chip")).to_contain_text(marking)
+            screen.press("Escape")
+
+    def test_a_click_on_a_point_of_another_marking_adds_a_point_to_the_one_that_is_drawn(
+        self, review: Review
+    ) -> None:
+        screen = review(1)
+        before = first_view(screen)
+        marking = "Goal left crossbar"
+        if marking in before["lines"]:
+            marking = "Goal right crossbar"
+        other, _, corner = interior_point(before)
+        screen.press("n")
+        screen.page.keyboard.type(marking.lower())
+        screen.press("Enter")
+        expect(screen.page.locator(".drawing-chip")).to_contain_text(marking)
+        at = screen.place(before, corner["x"], corner["y"])
+        screen.page.mouse.click(*at)
+        screen.saved()
+        # Once the marking has a point there, that point is moved.
+        screen.drag(at, 60, 0)
+        screen.press("Escape")
+        screen.saved()
+        now = first_view(screen)["lines"]
+        assert now[other] == before["lines"][other]
+        (drawn,) = now[marking]
+        assert drawn["x"] > corner["x"] + 20
+        undo(screen, before)
+
     def test_a_point_is_put_on_a_line(self, review: Review) -> None:
         screen = review(1)
         before = first_view(screen)
