@@ -329,6 +329,7 @@ PROPERTIES: Mapping[str, str] = {
     "record": "Which record of the file; null where it concerns the whole file.",
     "refused": "What was refused, and why.",
     "AcceptOutcome.refused": "How many were refused, by reason.",
+    "ReplacedVerdicts.state": "The verdict that the groups have now.",
     "rejected": "How many groups are rejected.",
     "report": "What was read and what was not.",
     "reprojected": "Where the 3D ball lies in the view, pixels; null without one.",

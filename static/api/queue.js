@@ -10,6 +10,8 @@ import { idempotencyKey, queryText, request } from './client.js';
  * @typedef {object} BulkPreview
  * @property {number} matches
  * @property {number} would_change
+ * @property {number} unchanged groups that have the verdict already
+ * @property {{state: string, groups: number}[]} replaced the other verdicts of those that would change
  * @property {RefusedJson[]} refused
  * @property {{id: number, key: string, number: number, label: string}[]} sample
  */

@@ -3,7 +3,7 @@
 
 import { ApiError } from '../api/problem.js';
 import { redoVerdicts, undoVerdicts } from '../api/queue.js';
-import { count, plural } from '../lib/format.js';
+import { count, plural, words } from '../lib/format.js';
 import { page } from '../lib/router.js';
 import { dataset, loadDatasets } from './datasets.js';
 import { groupDocument, open } from './group.js';
@@ -14,11 +14,27 @@ import { openQueue, queue } from './queue.js';
 /** @import {BulkResult} from '../api/queue.js' */
 /** @import {BatchDone} from './last_action.js' */
 
+/** Why a bulk verdict leaves groups alone: one, and several. */
+const REFUSALS = /** @type {{[reason: string]: [string, string]}} */ ({
+	submitted: ['it is a submitted independent annotation', 'they are submitted independent annotations'],
+	unsolved: ['it is not solved yet', 'they are not solved yet'],
+	needs_note: ['it fails a gate, and accepting that needs a note', 'they fail a gate, and accepting that needs a note'],
+	unusable_ball: [
+		'its 3D ball is unusable (below the grass, or uncertain by metres), and accepting that needs a note',
+		'their 3D balls are unusable (below the grass, or uncertain by metres), and accepting that needs a note',
+	],
+	no_picture: ['none of its views has a picture, and accepting that needs a note', 'none of their views has a picture, and accepting that needs a note'],
+});
+
+/** @param {string} reason @param {number} groups how many */
+export function whyUnchanged(reason, groups) {
+	return REFUSALS[reason]?.[groups === 1 ? 0 : 1] ?? words(reason);
+}
+
 /** Say what a bulk verdict did, and offer to take it back. @param {BulkResult} result @param {string} state @param {string} dataset */
 export function announceBatch({ batch, changed, refused }, state, dataset) {
-	const left = refused.reduce((sum, { groups }) => sum + groups, 0);
 	const text = batchText(changed, state);
-	const rest = left ? ` ${count(left)} ${left === 1 ? 'is unchanged' : 'are unchanged'}.` : '';
+	const rest = refused.map(({ reason, groups }) => ` ${count(groups)} ${groups === 1 ? 'is' : 'are'} unchanged: ${whyUnchanged(reason, groups)}.`).join('');
 	if (batch === null) {
 		inform(`${text}.${rest}`);
 		return;

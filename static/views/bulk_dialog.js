@@ -7,10 +7,10 @@ import { useState } from 'preact/hooks';
 import { ApiError, sentenceOf } from '../api/problem.js';
 import { postVerdicts, previewVerdicts } from '../api/queue.js';
 import { withValue } from '../lib/field.js';
-import { count, plural, words } from '../lib/format.js';
+import { count, plural } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
 import { reviewAddress } from '../state/navigation.js';
-import { readAgain, announceBatch } from '../state/queue_batches.js';
+import { readAgain, announceBatch, whyUnchanged } from '../state/queue_batches.js';
 import { clearTicks } from '../state/queue_ticks.js';
 import { REASONS } from '../state/reasons.js';
 import { FormDialog } from './dialog.js';
@@ -27,25 +27,20 @@ const STATES = [
 	{ state: 'unreviewed', verb: 'Withdraw', note: 'remove the verdict' },
 ];
 
-/** Why a group is left alone. */
-const REFUSALS = /** @type {{[reason: string]: string}} */ ({
-	submitted: 'they are submitted independent annotations',
-	unsolved: 'they are not solved yet',
-	needs_note: 'they fail a gate, and accepting that needs a note',
-	unusable_ball: 'their 3D ball is unusable (below the grass, or uncertain by metres), and accepting that needs a note',
-	no_picture: 'none of their views has a picture, and accepting that needs a note',
-});
-
-/** @param {{preview: BulkPreview, q: string, ticked: number}} props `ticked`: rows that are asked about one by one; 0: none are */
-function Outcome({ preview, q, ticked }) {
+/** @param {{preview: BulkPreview, state: string, q: string, ticked: number}} props `ticked`: rows that are asked about one by one; 0: none are */
+function Outcome({ preview, state: verdict, q, ticked }) {
+	const lost = verdict === 'unreviewed' ? 'removed' : 'replaced';
 	const gone = Math.max(ticked - preview.matches, 0);
 	return html`
 		<div role="status">
-			<p><strong>${count(preview.would_change)}</strong> of ${count(preview.matches)} ${preview.matches === 1 ? 'group changes' : 'groups change'}.</p>
+			<p><strong>${count(preview.would_change)}</strong> of ${plural(preview.matches, 'group')} ${preview.would_change === 1 ? 'changes' : 'change'}.</p>
+			${preview.replaced.map(({ state, groups }) => html`
+				<p key=${state}><span data-grade="warn">${count(groups)} ${groups === 1 ? 'is' : 'are'} ${state} now;</span> ${groups === 1 ? `its verdict is ${lost}` : `their verdicts are ${lost}`}.</p>`)}
+			${preview.unchanged ? html`<p>${plural(preview.unchanged, 'group')} ${preview.unchanged === 1 ? 'has' : 'have'} ${verdict === 'unreviewed' ? 'no verdict' : 'this verdict already'}.</p>` : null}
 			${gone ? html`<p><span data-grade="warn">${plural(gone, 'ticked group')} not changed:</span> no longer in this list, for example because somebody reviewed ${gone === 1 ? 'it' : 'them'} meanwhile</p>` : null}
 			${preview.refused.length ? html`
 				<ul class="bulk__refused">${preview.refused.map(({ reason, groups }) => html`
-					<li key=${reason}><span data-grade="warn">${plural(groups, 'group')} not changed:</span> ${REFUSALS[reason] ?? words(reason)}</li>`)}
+					<li key=${reason}><span data-grade="warn">${plural(groups, 'group')} not changed:</span> ${whyUnchanged(reason, groups)}</li>`)}
 				</ul>` : null}
 			${preview.sample.length ? html`
 				<p class="note">For example</p>
@@ -142,7 +137,7 @@ export function BulkDialog({ dataset, q, total, ticked, onClose }) {
 			<${Which} q=${q} total=${total} ticked=${ticked} chosen=${chosen} choose=${choose} />
 			<${Fields} ask=${ask} change=${(/** @type {Partial<BulkRequest>} */ values) => setAsk({ ...ask, ...values })} />
 			<div class="bulk__outcome">
-				${preview.value ? html`<${Outcome} preview=${preview.value} q=${q} ticked=${chosen && ticked ? ticked.count : 0} />` : preview.error ? null : html`<p role="status">Counting…</p>`}
+				${preview.value ? html`<${Outcome} preview=${preview.value} state=${verdict} q=${q} ticked=${chosen && ticked ? ticked.count : 0} />` : preview.error ? null : html`<p role="status">Counting…</p>`}
 				${state.error || preview.error ? html`<p class="form__error" role="alert">${state.error || sentenceOf(preview.error)}</p>` : null}
 			</div>
 		<//>

@@ -267,6 +267,42 @@ class TestBulkVerdicts:
         expect(page.locator(".pill[data-status=deferred]")).to_have_count(0)
         until(page, lambda: statuses(page) == before)
 
+    def test_it_says_which_verdicts_are_replaced_and_which_groups_stay_as_they_are(
+        self, open_page: OpenPage
+    ) -> None:
+        page = opened(open_page, "number<=3")
+        before = statuses(page)
+        first, second = (group["id"] for group in rows(page) if group["number"] in (1, 2))
+        judge(page, first, "rejected", "not_same_instant")
+        judge(page, second, "deferred")
+        page.keyboard.press("b")
+        outcome = page.locator(".bulk__outcome")
+        page.get_by_label("Defer").check()
+        expect(outcome).to_contain_text("2 of 3 groups change")
+        expect(outcome).to_contain_text("1 is rejected now; its verdict is replaced.")
+        expect(outcome).to_contain_text("1 group has this verdict already.")
+        page.get_by_label("Withdraw").check()
+        expect(outcome).to_contain_text("1 is deferred now; its verdict is removed.")
+        expect(outcome).to_contain_text("1 group has no verdict.")
+        page.keyboard.press("Escape")
+        for group in (first, second):
+            withdraw_verdict(page, group)
+        until(page, lambda: statuses(page) == before)
+
+    def test_the_bar_says_why_groups_were_left_alone(self, open_page: OpenPage) -> None:
+        page = open_page(None)
+        fails = next(group for group in rows(page) if group["passes"] is False)
+        good = next(group for group in rows(page) if group["passes"] and not group["findings"])
+        page = opened(open_page, f"id:{fails['id']},{good['id']}")
+        before = statuses(page)
+        page.keyboard.press("b")
+        why = "it fails a gate, and accepting that needs a note"
+        expect(page.locator(".bulk__refused")).to_have_text(f"1 group not changed: {why}")
+        page.get_by_role("button", name="Accept 1 group").click()
+        expect(page.locator(".bar")).to_contain_text(f"1 group accepted. 1 is unchanged: {why}.")
+        page.locator(".bar").get_by_role("button", name="Undo").click()
+        until(page, lambda: statuses(page) == before)
+
     def test_another_number_is_counted_again_and_can_be_decided(
         self, open_page: OpenPage, console: Any
     ) -> None:

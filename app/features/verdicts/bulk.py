@@ -8,6 +8,7 @@ once more after that.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -66,6 +67,14 @@ class RefusedGroups:
 
 
 @dataclass(frozen=True)
+class ReplacedVerdicts:
+    """Groups that would change and have another verdict (``state``, or its reason) until then."""
+
+    state: str
+    groups: int
+
+
+@dataclass(frozen=True)
 class AffectedGroup:
     """A group that would change, with the number and label that the queue shows."""
 
@@ -82,11 +91,15 @@ class BulkPlan:
     Attributes:
         matches: Groups that the query finds.
         would_change: Those that would get the verdict.
-        sample: The first of them.
+        unchanged: Those that have it already.
+        replaced: What verdicts ``would_change`` replaces, by state.
+        sample: The first of those that would change.
     """
 
     matches: int
     would_change: int
+    unchanged: int
+    replaced: tuple[ReplacedVerdicts, ...]
     refused: tuple[RefusedGroups, ...]
     sample: tuple[AffectedGroup, ...]
 
@@ -129,7 +142,17 @@ def plan_verdicts(
         AffectedGroup(row.group_id, row.key, row.number, row.label)
         for row in sorted_out.change[:SAMPLE]
     ]
-    return BulkPlan(len(rows), len(sorted_out.change), sorted_out.refused, tuple(sample))
+    replaced = Counter(
+        row.status for row in sorted_out.change if _has_another_verdict(row, verdict)
+    )
+    return BulkPlan(
+        matches=len(rows),
+        would_change=len(sorted_out.change),
+        unchanged=sorted_out.unchanged,
+        replaced=tuple(ReplacedVerdicts(*item) for item in sorted(replaced.items())),
+        refused=sorted_out.refused,
+        sample=tuple(sample),
+    )
 
 
 def give_verdicts(
@@ -251,9 +274,10 @@ def list_bulk_verdicts(
 
 @dataclass(frozen=True)
 class VerdictSelection:
-    """Rows that a verdict changes, and those that it is refused for."""
+    """Rows that a verdict changes, how many have it already, and those that it is refused for."""
 
     change: list[Any]
+    unchanged: int
     refused: tuple[RefusedGroups, ...]
 
 
@@ -262,13 +286,13 @@ def select_groups_for_verdict(
 ) -> VerdictSelection:
     """The groups of a dataset that a verdict changes, and how many it is refused for, and why."""
     reasons = (SUBMITTED, UNSOLVED, NEEDS_NOTE, UNUSABLE_BALL, NO_PICTURE)
-    change, refused = [], dict.fromkeys(reasons, 0)
+    change, unchanged, refused = [], 0, dict.fromkeys(reasons, 0)
     closed = list_closed_copies(session, dataset_id) if dataset_id > COPIES else ()
     unsolved = _unsolved_groups(session, dataset_id, rows) if verdict.state == "accepted" else ()
     for row in rows:
         if _has_verdict(row, verdict):
-            continue
-        if row.group_id in closed:
+            unchanged += 1
+        elif row.group_id in closed:
             refused[SUBMITTED] += 1
         elif row.group_id in unsolved:
             refused[UNSOLVED] += 1
@@ -281,7 +305,7 @@ def select_groups_for_verdict(
         else:
             change.append(row)
     refusals = (RefusedGroups(reason, count) for reason, count in refused.items() if count)
-    return VerdictSelection(change, tuple(refusals))
+    return VerdictSelection(change, unchanged, tuple(refusals))
 
 
 def _unsolved_groups(session: Session, dataset_id: int, rows: Sequence[Any]) -> set[int]:
@@ -305,6 +329,12 @@ def _has_verdict(row: Any, verdict: Verdict) -> bool:
         return True
     same = row.status == verdict.state and row.reason == verdict.reason and not row.stale
     return bool(same and verdict.note is None)
+
+
+def _has_another_verdict(row: Any, verdict: Verdict) -> bool:
+    """Whether a person would lose a verdict: one of an earlier state of the group is only renewed."""
+    same = (row.status, row.reason) == (verdict.state, verdict.reason)
+    return row.status != "unreviewed" and not same
 
 
 class BulkVerdictRun:

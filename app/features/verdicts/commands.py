@@ -56,7 +56,9 @@ def verdict(
     done = plan if report is None else report
     values: dict[str, Any] = {"matches": plan["matches"]}
     if report is None:
-        values["would_change"] = plan["would_change"]
+        replaced = {item["state"]: item["groups"] for item in plan["replaced"]}
+        values |= {"would_change": plan["would_change"], "unchanged": plan["unchanged"]}
+        values |= {"replaced": replaced}
     else:
         values |= {"changed": report["changed"], "batch": report["batch"]}
     refused = {item["reason"]: item["groups"] for item in done["refused"]}

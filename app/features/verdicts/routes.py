@@ -22,7 +22,13 @@ from app.features.groups.schemas import GroupDocument, make_group_response
 from app.features.groups.state import GroupState
 from app.features.queue.query import MAX_LISTED_LENGTH
 from app.features.verdicts import bulk, bulk_undo
-from app.features.verdicts.bulk import AffectedGroup, BulkPlan, BulkVerdictReport, RefusedGroups
+from app.features.verdicts.bulk import (
+    AffectedGroup,
+    BulkPlan,
+    BulkVerdictReport,
+    RefusedGroups,
+    ReplacedVerdicts,
+)
 from app.features.verdicts.bulk_undo import RedoReport, UndoReport
 from app.features.verdicts.service import check_verdict, set_verdict
 from app.features.verdicts.undo import redo_verdict, undo_verdict
@@ -134,6 +140,12 @@ class BulkResult(Document):
     dry_run: bool
     matches: int | None = Field(description="Groups that the query finds; dry run only.")
     would_change: int | None = Field(description="Dry run only, like `sample`.")
+    unchanged: int | None = Field(
+        description="Groups that have this verdict already; dry run only."
+    )
+    replaced: list[ReplacedVerdicts] | None = Field(
+        description="Groups among `would_change` whose present verdict is replaced, by its state; dry run only."
+    )
     sample: list[AffectedGroup] | None
     batch: int | None = Field(
         description="Batch that `POST /verdict-batches/{batch}/undo` undoes; null when nothing changed."
@@ -149,9 +161,8 @@ class BulkResult(Document):
     @staticmethod
     def of_report(report: BulkVerdictReport) -> BulkResult:
         """The document of what was done."""
-        return BulkResult(
-            dry_run=False, matches=None, would_change=None, sample=None, **vars(report)
-        )
+        tried = dict.fromkeys(("matches", "would_change", "unchanged", "replaced", "sample"))
+        return BulkResult(dry_run=False, **tried, **vars(report))
 
 
 class BulkVerdictDocument(Document):

@@ -26,6 +26,7 @@ from app.features.solutions.service import solve_dataset
 from app.features.verdicts import bulk, bulk_undo
 from app.features.verdicts.bulk import (
     BulkVerdictRun,
+    ReplacedVerdicts,
     give_verdicts,
     list_bulk_verdicts,
     plan_verdicts,
@@ -76,7 +77,22 @@ class TestPlanVerdicts:
         assert (plan.matches, plan.would_change) == (4, 2)
         assert [(item.reason, item.groups) for item in plan.refused] == [("needs_note", 1)]
         assert [group.id for group in plan.sample] == [ids[1], ids[3]]
+        assert (plan.unchanged, plan.replaced) == (1, ())
         assert statuses(store) == ["accepted", *["unreviewed"] * 3]
+
+    def test_counts_the_verdicts_that_are_replaced_by_their_state(self, store, ids) -> None:
+        judge(store, ids[0], "rejected", reason="duplicate_view")
+        judge(store, ids[1], "deferred")
+        judge(store, ids[3], "rejected", reason="bad_calibration")
+        plan = plan_verdicts(store, 1, "", "rejected", "bad_calibration")
+        assert (plan.matches, plan.would_change, plan.unchanged) == (4, 3, 1)
+        assert plan.replaced == (ReplacedVerdicts("deferred", 1), ReplacedVerdicts("rejected", 1))
+        etag = load_group_state(store, ids[3]).etag
+        edit = make_set_ball_edit("10_1.png", None)
+        submit_edit(store, ids[3], edit, if_match=etag, actor="ann")
+        # The same verdict, given on an earlier state of the group: it is only renewed.
+        again = plan_verdicts(store, 1, "", "rejected", "bad_calibration")
+        assert (again.would_change, again.unchanged, again.replaced) == (4, 0, plan.replaced)
 
     def test_balls_that_cannot_be_used_are_counted_and_left_alone(
         self, store, fill, make_group

@@ -53,6 +53,7 @@ class TestVerdict:
         tried = json.loads(out)
         assert (code, tried["matches"], tried["would_change"]) == (0, 2, 2), err
         assert ([item["number"] for item in tried["sample"]], accepted(run)) == ([1, 2], 0)
+        assert (tried["unchanged"], tried["replaced"]) == (0, {})
         code, out, _ = run("--actor", "nightly", *words, "--expected", 2)
         assert (code, json.loads(out)["changed"], accepted(run)) == (0, 2, 2)
         store = Store.open(Settings(home=tmp_path / "home"))

@@ -30,11 +30,15 @@ class TestPostVerdicts:
         plan = api.post(VERDICTS, params={"dry_run": True}, json=body).json()
         assert (plan["dry_run"], plan["matches"], plan["would_change"]) == (True, 3, 3)
         assert (len(plan["sample"]), plan["batch"], plan["changed"]) == (3, None, 0)
+        assert (plan["unchanged"], plan["replaced"]) == (0, [])
         assert statuses(api) == {"unreviewed"}
         done = api.post(VERDICTS, json={**body, "expected": plan["would_change"]})
         assert done.status_code == 200
         assert (done.json()["batch"], done.json()["changed"], done.json()["refused"]) == (1, 3, [])
         assert statuses(api) == {"accepted"}
+        assert (done.json()["unchanged"], done.json()["replaced"]) == (None, None)
+        other = api.post(VERDICTS, params={"dry_run": True}, json={"state": "deferred"}).json()
+        assert (other["unchanged"], other["replaced"]) == (0, [{"state": "accepted", "groups": 3}])
 
     def test_groups_that_fail_a_gate_need_a_note_and_are_counted(self, api) -> None:
         view = api.get("/api/v1/groups/1").json()
