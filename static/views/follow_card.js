@@ -38,7 +38,7 @@ function Found({ found }) {
 		</dl>
 		<${Strip} found=${found} here=${group.value?.id} />
 		${found.unreadable.length ? html`<p class="note" role="note">${plural(found.unreadable.length, 'frame')} cannot be read; the ball was followed without ${found.unreadable.length === 1 ? 'it' : 'them'}: ${found.unreadable.slice(0, 5).join(', ')}${found.unreadable.length > 5 ? ', …' : ''}.</p>` : null}
-		${found.sized ? null : html`<p class="note">No camera of this view is known: the ball is taken to be as large as the one that was clicked.</p>`}
+		${found.sized ? null : html`<p class="note">This view has no camera: the ball is assumed to be as large as the one you clicked.</p>`}
 		${open ? html`
 			<p class="follow__open">${plural(open, 'uncertain view')}${open === 1 ? ' is' : ' are'} left out. <button class="link-button" type="button" onClick=${nextUnsure}>Look at the next</button>${here ? html`<br />Press <kbd>Y</kbd> to accept the one that is shown here.` : null}</p>` : null}
 		<div class="follow__tools">

@@ -80,7 +80,7 @@ function NewLinkCard({ of, renew, error, close }) {
 		<section class="card" aria-labelledby="people-new-link">
 			<h2 id="people-new-link">New link for ${of.name}</h2>
 			<form class="form" onSubmit=${send}>
-				<div class="form__row"><label for="people-link-email">E-mail (optional)</label><input class="field" id="people-link-email" name="email" type="email" maxlength="254" autocomplete="off" ref=${field} /><small>The link is sent there; left empty, it is shown here. The address is not stored.</small></div>
+				<div class="form__row"><label for="people-link-email">E-mail (optional)</label><input class="field" id="people-link-email" name="email" type="email" maxlength="254" autocomplete="off" ref=${field} /><small>The link is sent there. If you leave it empty, the link is shown here. The address is not stored.</small></div>
 				<${FormError} error=${error} />
 				<p class="buttons"><button class="button button--primary" type="submit">Make a new link</button><button class="button" type="button" onClick=${close}>Cancel</button></p>
 			</form>

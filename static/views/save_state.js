@@ -43,7 +43,7 @@ function saveState() {
 function ConflictLink({ shown }) {
 	const other = held.value.find(({ group }) => group !== shown);
 	if (!other) return null;
-	return html`<a class="save__conflict" href=${reviewAddress(other.group)} title="The group whose changes were not saved">Go to the conflict</a>`;
+	return html`<a class="save__conflict" href=${reviewAddress(other.group)} title="Opens the group with your unsaved changes">Go to the conflict</a>`;
 }
 
 /** @param {{elsewhere?: boolean}} props `elsewhere`: no group is on screen, so that only what is not saved is worth a word */
