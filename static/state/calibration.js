@@ -13,7 +13,7 @@ import { applyEdit } from './edits.js';
 import { group, groupDocument, onLost, solution, submit } from './group.js';
 import { redo as redoSaved, undo as undoSaved } from './undo.js';
 import { sameLines } from './line_changes.js';
-import { announce } from './notice.js';
+import { announce, explain } from './notice.js';
 import { refuses } from './rights.js';
 import { asProposed } from './proposal_lines.js';
 import { begin, changesOf, linesOf, overlapOf, proposedLines, rebase, stage, stageEdit, stepBack, stepForward } from './staging.js';
@@ -162,6 +162,10 @@ export function overlapsStaged(newer) {
 export function discardStaged() {
 	const at = view.value;
 	if (!at) return;
+	if (staging.value.steps.length === 0) {
+		explain('Nothing is staged.');
+		return;
+	}
 	keep(begin(at.lines));
 	held.value = null;
 	choice.value = null;
@@ -172,7 +176,7 @@ export function discardStaged() {
 export function commit() {
 	const at = view.value;
 	if (!at || !changed.value) {
-		announce('Nothing is staged.');
+		explain('Nothing is staged.');
 		return false;
 	}
 	// What is staged stays where it cannot be saved.

@@ -5,7 +5,7 @@ import { group, solution, submitDismissal } from './group.js';
 import { did, didAgain, forget, tookBack } from './last_action.js';
 import { shownFinding } from './suggestions.js';
 import { returnTo } from './navigation.js';
-import { announce, complain } from './notice.js';
+import { announce, complain, explain } from './notice.js';
 import { openFindings } from './open_findings.js';
 
 /** @import {DismissalDone} from './last_action.js' */
@@ -28,7 +28,7 @@ export function dismiss(finding, dismissed) {
 export function dismissShown() {
 	const finding = shownFinding.value ?? openFindings(solution.value)[0];
 	if (finding) dismiss(finding, true);
-	else announce('No finding is open in this group.');
+	else explain('No finding is open in this group.');
 }
 
 /** Return to the group and do the opposite of what was done. @param {DismissalDone} action */

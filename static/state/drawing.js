@@ -8,7 +8,7 @@ import { expectedDiameter, newBall, placeBall } from './ball_edits.js';
 import { chosenPlace, dropCross, setCross } from './drawing_cross.js';
 import { applyEdit } from './edits.js';
 import { group, solution, submit } from './group.js';
-import { announce, complain } from './notice.js';
+import { announce, complain, explain } from './notice.js';
 import { drawing, focused, focusView, isSmall, pointerPlace, selected } from './workspace.js';
 
 /** @import {GroupDocument, PointJson, ViewJson} from '../api/types.js' */
@@ -121,7 +121,7 @@ export function drawHere() {
 	if (!view) return;
 	const at = chosenPlace(view);
 	if (at) drawAt(view, at);
-	else announce(BY_KEYS);
+	else explain(BY_KEYS);
 }
 
 /** Where the cross of a person without a pointer begins: at the 3D ball, at the ends of the projected line, else in the middle. @param {ViewJson} view */
@@ -147,7 +147,7 @@ export function insertAt(view, viewport, place) {
 	const at = toImage(viewport, place);
 	const marking = markingAt(view, at, REACH / viewport.scale);
 	if (marking) putPoint(view, marking, at);
-	else announce('There is no line here.');
+	else explain('There is no line here.');
 }
 
 /** @param {ViewJson} view @param {string} marking @param {PointJson} at */

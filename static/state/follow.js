@@ -16,7 +16,7 @@ import { loadDatasets } from './datasets.js';
 import { group, groupDocument, open } from './group.js';
 import { did, didAgain, forget, forgetUndone, tookBack } from './last_action.js';
 import { reviewAddress } from './navigation.js';
-import { announce, complain, inform } from './notice.js';
+import { announce, complain, explain, inform } from './notice.js';
 import { refuses } from './rights.js';
 
 /** @import {FollowedBall, FollowedItem} from '../api/follow.js' */
@@ -105,8 +105,8 @@ export function endFollow() {
 /** Make followed balls those of their views. @param {FollowedItem[]} items */
 export async function acceptFollowed(items) {
 	const at = follow.value;
-	if (!at?.found) return announce('The ball is still being followed.');
-	if (isSending) return announce('The balls are being placed.');
+	if (!at?.found) return explain('The ball is still being followed.');
+	if (isSending) return explain('The balls are being placed.');
 	if (items.length === 0) return complain('The remaining views are uncertain: check each, and accept it with Y.');
 	const from = at.found.group;
 	/** @type {FollowDone} */

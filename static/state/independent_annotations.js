@@ -9,7 +9,7 @@ import { navigate } from '../lib/router.js';
 import { groupDocument } from './group.js';
 import { COPIES } from './me.js';
 import { reviewAddress } from './navigation.js';
-import { announce, complain } from './notice.js';
+import { announce, complain, explain } from './notice.js';
 
 /** Whether the guidelines are shown. */
 export const guidelinesShown = signal(false);
@@ -32,7 +32,7 @@ async function told(ask) {
 export async function annotateOwn() {
 	const group = groupDocument.value;
 	if (!group) return;
-	if (isCopy(group)) { announce('This is already your independent annotation.'); return; }
+	if (isCopy(group)) { explain('This is already your independent annotation.'); return; }
 	const take = await told(() => postIndependentAnnotation(group.id));
 	if (take) navigate(reviewAddress(take.group));
 }

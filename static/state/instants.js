@@ -8,7 +8,7 @@ import { ApiError } from '../api/problem.js';
 import { endDrawing } from './drawing.js';
 import { draft, group, pending } from './group.js';
 import { loadImage } from './images.js';
-import { announce, complain, inform } from './notice.js';
+import { announce, complain, explain } from './notice.js';
 import { drawing, focused, otherInstant, selected } from './workspace.js';
 
 /** @import {NeighbourFrame} from '../api/client.js' */
@@ -36,7 +36,7 @@ export async function stepInstant(by) {
 	if (!view) return;
 	try {
 		const items = await findFramesAround(view);
-		if (items.length === 0) inform(NONE);
+		if (items.length === 0) explain(NONE);
 		else await show(view, items, by);
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
@@ -50,7 +50,7 @@ async function show(view, items, by) {
 	const ahead = items.map(({ offset }) => offset).concat(0).filter((offset) => (offset - present) * by > 0);
 	const offset = ahead.sort((a, b) => (a - b) * by)[0];
 	if (offset === undefined) {
-		inform(`No more frames ${by < 0 ? 'before' : 'after'} this one can be shown. At most five are shown, if they are on disk.`);
+		explain(`No more frames ${by < 0 ? 'before' : 'after'} this one can be shown. At most five are shown, if they are on disk.`);
 		return;
 	}
 	const next = items.find((item) => item.offset === offset);

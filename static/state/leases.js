@@ -13,7 +13,7 @@ import { navigate, page } from '../lib/router.js';
 import { settle } from './group.js';
 import { me, mustLogIn } from './me.js';
 import { batchId, currentId, goNext, reviewAddress } from './navigation.js';
-import { announce, complain, dismiss, inform } from './notice.js';
+import { announce, complain, dismiss, explain, inform } from './notice.js';
 import { outbox } from './outbox.js';
 import { isAway } from './sending.js';
 
@@ -217,7 +217,7 @@ async function handIn(held) {
 	if (isAway.value && waits(held.group)) inform('This group is submitted as soon as its changes are saved.');
 	await arrived(held.group);
 	if (outbox.value.some((item) => item.group === held.group)) {
-		announce('First resolve the conflict: choose which version to keep.');
+		explain('First resolve the conflict: choose which version to keep.');
 		return false;
 	}
 	try {

@@ -9,7 +9,7 @@ import { address, navigate, page, param } from '../lib/router.js';
 import { stored } from '../lib/storage.js';
 import { prefetch } from './documents.js';
 import { groupDocument, open, settle } from './group.js';
-import { announce, complain, dismiss } from './notice.js';
+import { complain, dismiss, explain } from './notice.js';
 
 /** @import {Neighbours} from '../api/types.js' */
 
@@ -136,7 +136,7 @@ async function go(step, otherwise, stillWanted = () => true) {
 	}
 	if (id === undefined) {
 		const unknown = neighbours.value?.id !== from;
-		announce(unknown ? 'The queue cannot be read while the server is unreachable.' : otherwise);
+		explain(unknown ? 'The queue cannot be read while the server is unreachable.' : otherwise);
 		return unknown;
 	}
 	leaveFor(id);
@@ -184,7 +184,7 @@ async function far(otherwise, find) {
 	try {
 		const id = await find(from);
 		if (currentId() !== from) return;
-		if (id === undefined) announce(otherwise);
+		if (id === undefined) explain(otherwise);
 		else leaveFor(id);
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;

@@ -1,5 +1,5 @@
 // @ts-check
-/** What the page says to the person: one notice to read, one sentence for screen readers. */
+/** What the page says to the person: one notice to read, one sentence about the last key or click. */
 
 import { signal } from '@preact/signals';
 
@@ -8,12 +8,17 @@ import { signal } from '@preact/signals';
 /** The bar below the header; null when there is nothing to say. */
 export const notice = signal(/** @type {Notice | null} */ (null));
 
-/** The last thing that happened, for `aria-live`. */
-export const announced = signal('');
+/** The last thing that happened, for `aria-live`; `shown`: also to read, for a moment. */
+export const announced = signal({ text: '', shown: false });
 
-/** @param {string} text */
+/** Say what the page shows anyway. @param {string} text */
 export function announce(text) {
-	announced.value = text;
+	announced.value = { text, shown: false };
+}
+
+/** Say, and show, why a key or a button changes nothing. @param {string} text */
+export function explain(text) {
+	announced.value = { text, shown: true };
 }
 
 /** @param {string} text @param {Notice['action']} [action] */

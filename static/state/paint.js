@@ -11,7 +11,7 @@ import { latest } from '../lib/latest.js';
 import { page } from '../lib/router.js';
 import { changed, changes, lines, shownSolution, staging, stageLines, view } from './calibration.js';
 import { sameLines } from './line_changes.js';
-import { announce, complain } from './notice.js';
+import { announce, complain, explain } from './notice.js';
 import { besideDrawn, leavesOpen } from './proposal_lines.js';
 import { proposals } from './proposals.js';
 import { linesOf, PROPOSED } from './staging.js';
@@ -81,14 +81,14 @@ export async function snapToPaint(only = null) {
 	const at = view.value;
 	if (!at || asking.value === 'lines') return;
 	if (!lines.value[only ?? ''] && (only !== null || Object.keys(lines.value).length === 0)) {
-		announce('There are no points to move onto the paint.');
+		explain('There are no points to move onto the paint.');
 		return;
 	}
 	const before = lines.value;
 	const found = isPaintCurrent.value ? paint.value : await ask(at);
 	if (!found) return;
 	if (view.value?.id !== at.id || !sameLines(before, lines.value)) {
-		announce('The lines have changed meanwhile: nothing was moved.');
+		explain('The lines have changed meanwhile: nothing was moved.');
 		return;
 	}
 	if (found.reason === 'paint_disagrees' || Object.keys(found.points).length === 0) {
@@ -102,7 +102,7 @@ export async function snapToPaint(only = null) {
 function stage({ lines: next, moved, left }, only) {
 	const stayed = left ? `; ${plural(left, 'point')} without paint nearby ${left === 1 ? 'was' : 'were'} not moved` : '';
 	if (moved.length === 0) {
-		announce(`Nothing was moved${stayed}.`);
+		explain(`Nothing was moved${stayed}.`);
 		return;
 	}
 	stageLines(next, only ? `${only} moved onto the paint` : 'Points moved onto the paint');
@@ -136,7 +136,7 @@ export async function proposeFromPaint() {
 	const at = view.value;
 	if (!at || asking.value !== null) return;
 	if (!isWaiting.value) {
-		announce('Lines are proposed only while a view has no camera; this view has one.');
+		explain('Lines are proposed only while a view has no camera; this view has one.');
 		return;
 	}
 	const known = proposals.peek().get(at.key);
@@ -149,7 +149,7 @@ export async function proposeFromPaint() {
 	try {
 		const found = await proposeLines(at.id, changes.value);
 		if (view.value?.id !== at.id) return;
-		if (!sameLines(before, lines.value)) announce('The lines have changed meanwhile: nothing was proposed.');
+		if (!sameLines(before, lines.value)) explain('The lines have changed meanwhile: nothing was proposed.');
 		else if (found.outcome !== 'proposed') complain(`No lines are proposed. ${found.sentence}`);
 		else stageProposed(found);
 	} catch (error) {

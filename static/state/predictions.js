@@ -13,7 +13,7 @@ import { Kept } from '../lib/kept.js';
 import { page } from '../lib/router.js';
 import { stored } from '../lib/storage.js';
 import { group, groupDocument, submit } from './group.js';
-import { announce, complain } from './notice.js';
+import { announce, complain, explain } from './notice.js';
 import { acceptEdit, acceptEdits, marksOf, setNames, setToShow, surest } from './prediction_marks.js';
 import { wasRefused } from './sending.js';
 import { boxes, focused, overlaysHidden, selected } from './workspace.js';
@@ -170,8 +170,8 @@ export function acceptInHand() {
 	const marks = marksIn(view);
 	const mark = object?.kind === 'prediction' ? marks.find(({ id }) => id === object.prediction) : surest(marks);
 	if (mark) acceptMark(view, mark);
-	else if (marks.length) announce(`No prediction in view ${view.letter} is above the threshold: select one to accept it.`);
-	else announce(`There is no prediction in view ${view.letter}.`);
+	else if (marks.length) explain(`No prediction in view ${view.letter} is above the threshold: select one to accept it.`);
+	else explain(`There is no prediction in view ${view.letter}.`);
 }
 
 /** Give every view of the group that has no ball its surest prediction; each is an edit of its own. */
@@ -181,5 +181,6 @@ export function acceptAll() {
 	if (!present || !shown || isHidden()) return;
 	const edits = acceptEdits(present, shown.views);
 	for (const edit of edits) submit(edit);
-	announce(edits.length ? `${plural(edits.length, 'prediction')} accepted.` : 'Every view with a prediction above the threshold has a ball already.');
+	if (edits.length) announce(`${plural(edits.length, 'prediction')} accepted.`);
+	else explain('Every view with a prediction above the threshold has a ball already.');
 }

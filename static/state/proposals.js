@@ -9,7 +9,7 @@ import { ApiError } from '../api/problem.js';
 import { plural } from '../lib/format.js';
 import { page } from '../lib/router.js';
 import { group, groupDocument, submit } from './group.js';
-import { announce, complain } from './notice.js';
+import { announce, complain, explain } from './notice.js';
 import { areNew, lookedAt, openProposals, settledState, stateOf, waitingViews, waitsForLines } from './proposal_lines.js';
 import { focused, overlaysHidden } from './workspace.js';
 
@@ -110,7 +110,7 @@ export async function proposeNow(view) {
 /** Add the proposed lines of a view to its lines. @param {ViewJson} view */
 export function acceptProposal(view) {
 	const item = proposals.peek().get(view.key);
-	if (!item) announce(whyNone(view));
+	if (!item) explain(whyNone(view));
 	else if (item.outcome !== 'proposed') complain(`No lines are proposed for view ${view.letter}. ${item.sentence}`);
 	else if (overlaysHidden.value) complain('The proposed lines are hidden. Press H to see what you would accept.');
 	else {

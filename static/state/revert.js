@@ -4,7 +4,7 @@
 import { request } from '../api/client.js';
 import { ApiError } from '../api/problem.js';
 import { group, groupDocument, submit } from './group.js';
-import { announce, complain } from './notice.js';
+import { complain, explain } from './notice.js';
 import { selected } from './workspace.js';
 
 /** @import {BallJson, PointJson} from '../api/types.js' */
@@ -18,7 +18,7 @@ export async function revertSelected() {
 	const object = selected.value;
 	const at = groupDocument.value;
 	if (!object || object.kind === 'prediction' || !at) {
-		announce('Select a point or a ball first.');
+		explain('Select a point or a ball first.');
 		return;
 	}
 	try {
@@ -33,7 +33,7 @@ export async function revertSelected() {
 /** @param {Selection} object @param {Entry[]} entries */
 function revert(object, entries) {
 	const edit = originalOf(object, entries);
-	if (edit === null) announce('Nothing to reset: this object was never edited.');
+	if (edit === null) explain('Nothing to reset: this object was never edited.');
 	else if (edit === 'several') complain('The imported data has several balls in this view: use undo to restore them.');
 	else if (group.value) {
 		selected.value = object.kind === 'ball' ? object : null;

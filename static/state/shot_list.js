@@ -5,7 +5,7 @@ import { signal } from '@preact/signals';
 
 import { ApiError } from '../api/problem.js';
 import { getShots, putShots } from '../api/recordings.js';
-import { announce, complain, inform } from './notice.js';
+import { announce, complain, explain } from './notice.js';
 
 /** @import {Shot} from '../api/recordings.js' */
 /** @typedef {{items: Shot[], etag: string}} Shots */
@@ -83,7 +83,7 @@ export function makeShotList(id) {
 
 	function undo() {
 		const last = before.pop();
-		if (!last) { inform('There is nothing to undo.'); return; }
+		if (!last) { explain('There is nothing to undo.'); return; }
 		send(last);
 		announce('Undone.');
 	}

@@ -13,7 +13,7 @@ import { known, load } from './documents.js';
 import { groupDocument, settle } from './group.js';
 import { loadImage } from './images.js';
 import { currentId, reviewAddress } from './navigation.js';
-import { announce, dismiss } from './notice.js';
+import { announce, dismiss, explain } from './notice.js';
 
 /** @import {GroupDocument} from '../api/types.js' */
 /** @import {TimelineJson} from '../api/timeline.js' */
@@ -132,7 +132,7 @@ const worstFirst = computed(() => {
 export function goToWorst() {
 	const order = worstFirst.value;
 	if (order.length === 0) {
-		announce('No frame has an error yet.');
+		explain('No frame has an error yet.');
 		return;
 	}
 	const next = order[(order.indexOf(position.value) + 1) % order.length];
@@ -159,7 +159,7 @@ async function play() {
 		const ids = columns.value?.id ?? [];
 		if (next >= ids.length) {
 			playing.value = false;
-			announce('That was the last frame.');
+			explain('That was the last frame.');
 			return;
 		}
 		await ready(ids.slice(next, next + AHEAD));

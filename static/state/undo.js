@@ -8,7 +8,7 @@ import { dataset } from './datasets.js';
 import { groupDocument, lastStationOf, open, pending, submitTurn } from './group.js';
 import { actions, didAgain, forget, forgetEdit, nextAgain, nextBack, tookBack, undone } from './last_action.js';
 import { returnTo, reviewAddress } from './navigation.js';
-import { announce, complain } from './notice.js';
+import { announce, complain, explain } from './notice.js';
 import { discard, outbox } from './outbox.js';
 import { busyWith, isAway, untilTakenUp, wake } from './sending.js';
 import { redoVerdict, undoVerdict } from './verdicts.js';
@@ -64,7 +64,7 @@ async function undoOne() {
 	// What the page before this one did last may still wait for its answer.
 	await untilTakenUp();
 	const action = next.value;
-	if (action === null) announce('Nothing to undo.');
+	if (action === null) explain('Nothing to undo.');
 	else if (action === 'here') undoHere();
 	else if (action.kind === 'verdict') await undoVerdict(action);
 	else if (action.kind === 'edit') await undoThere(action);
@@ -126,7 +126,7 @@ async function redoOne() {
 	else if (isAway.value) complain('Redo needs the server, which cannot be reached.');
 	else if (action) await redoThere(action);
 	else if (canRedoHere.value) submitTurn('redo');
-	else announce('Nothing to redo.');
+	else explain('Nothing to redo.');
 }
 
 /** Return to a group and make its undone edit again. @param {EditDone} action */

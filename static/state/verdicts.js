@@ -11,7 +11,7 @@ import { frozen } from './return_group.js';
 import { actions, did, didAgain, forget, forgetUndone, tookBack, undone } from './last_action.js';
 import { batchId, currentId, goNext, query, queueAddress, returnTo, reviewAddress } from './navigation.js';
 import { isMoving, nextOfBatch } from './leases.js';
-import { announce, complain, inform } from './notice.js';
+import { announce, complain, explain, inform } from './notice.js';
 import { outbox } from './outbox.js';
 import { reasonText } from './reasons.js';
 import { refuses } from './rights.js';
@@ -32,7 +32,7 @@ export function accept() {
 	const group = groupDocument.value;
 	if (!group) return;
 	if (!group.solution) {
-		announce('This group is not solved yet and cannot be accepted.');
+		explain('This group is not solved yet and cannot be accepted.');
 		return;
 	}
 	if (!group.solution.passes || isBlind(group) || doubt(group.solution)) asking.value = 'override';
@@ -52,7 +52,7 @@ function viewInHand() {
 /** Ask for the reason to leave the view in hand out of its group. */
 export function askViewReason() {
 	const view = viewInHand();
-	if (view && !view.included) announce(`View ${view.letter} is left out already.`);
+	if (view && !view.included) explain(`View ${view.letter} is left out already.`);
 	else if (view) asking.value = 'view';
 }
 
@@ -113,7 +113,7 @@ function decide(state, reason, note) {
 		return;
 	}
 	if (conflict.value) {
-		announce('First resolve the conflict: choose which version to keep.');
+		explain('First resolve the conflict: choose which version to keep.');
 		return;
 	}
 	asking.value = null;

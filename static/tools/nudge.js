@@ -4,7 +4,7 @@
 import { ballOf } from '../geometry/preview.js';
 import { movePoint, viewOf } from '../state/edits.js';
 import { draft, group, propose, submit } from '../state/group.js';
-import { announce } from '../state/notice.js';
+import { explain } from '../state/notice.js';
 import { selected } from '../state/workspace.js';
 import { growBall, moveBall } from './drags.js';
 
@@ -38,7 +38,7 @@ function moved(dx, dy) {
 		return ball && moveBall(view, ball, dx, dy);
 	}
 	if (object.kind === 'prediction') {
-		announce('Accept the prediction first: it cannot be moved before.');
+		explain('Accept the prediction first: it cannot be moved before.');
 		return null;
 	}
 	const point = view.lines[object.marking]?.[object.index];
@@ -50,7 +50,7 @@ function moved(dx, dy) {
 export function nudgeDiameter(direction) {
 	const object = selected.value;
 	if (object?.kind !== 'ball' || !group.value) {
-		announce('Select a ball first.');
+		explain('Select a ball first.');
 		return;
 	}
 	const view = viewOf(group.value, object.view);
@@ -61,10 +61,13 @@ export function nudgeDiameter(direction) {
 /** Take the selected point, or ball, away. */
 export function deleteSelected() {
 	const object = selected.value;
-	if (!object || !group.value) return;
+	if (!object || !group.value) {
+		explain('Select a point or a ball first.');
+		return;
+	}
 	const view = viewOf(group.value, object.view);
 	if (object.kind === 'prediction') {
-		announce('A prediction cannot be deleted here. It is not used unless a person accepts it.');
+		explain('A prediction cannot be deleted here. It is not used unless a person accepts it.');
 		return;
 	}
 	selected.value = null;

@@ -1,7 +1,8 @@
 // @ts-check
-/** Bars below the header: what went wrong. They block nothing. */
+/** Bars below the header: what went wrong. They block nothing; a key that does nothing is explained on the header. */
 
 import { html } from 'htm/preact';
+import { useRef } from 'preact/hooks';
 
 import { plural } from '../lib/format.js';
 import { announced, dismiss, notice } from '../state/notice.js';
@@ -39,7 +40,11 @@ function Notice() {
 	`;
 }
 
-/** Says to screen readers what just happened. */
+/** Says to screen readers what just happened, and shows for a moment why nothing did. */
 export function Announcer() {
-	return html`<p class="hidden-text" role="status" aria-live="polite">${announced.value}</p>`;
+	const said = announced.value;
+	const times = useRef({ said, count: 0 });
+	// A new element each time: the same sentence is read out, and shown, once more.
+	if (times.current.said !== said) times.current = { said, count: times.current.count + 1 };
+	return html`<p class=${said.shown ? 'explained' : 'hidden-text'} role="status" aria-live="polite"><span key=${times.current.count}>${said.text}</span></p>`;
 }

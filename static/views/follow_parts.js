@@ -5,7 +5,7 @@ import { signal } from '@preact/signals';
 import { useMemo } from 'preact/hooks';
 
 import { lazy } from '../lib/lazy.js';
-import { announce } from '../state/notice.js';
+import { explain } from '../state/notice.js';
 
 /** @import {ViewJson} from '../api/types.js' */
 /** @import {ViewPicture} from '../overlays/scene.js' */
@@ -24,7 +24,7 @@ export function isFollowing() {
 /** Follow the ball of a view; again: accept what is sure. @param {ViewJson | undefined} view */
 export async function followOrAccept(view) {
 	const parts = loaded.value ?? await load();
-	if (!parts) announce('The server cannot be reached.');
+	if (!parts) explain('The server cannot be reached.');
 	else if (parts.follow.value && (!view || parts.isOfCamera(view))) parts.acceptFollowed(parts.sure.value);
 	else if (view) parts.startFollow(view);
 }
@@ -33,7 +33,7 @@ export async function followOrAccept(view) {
 export async function followAnew(view) {
 	const parts = loaded.value ?? await load();
 	if (parts) parts.startFollow(view);
-	else announce('The server cannot be reached.');
+	else explain('The server cannot be reached.');
 }
 
 /** Leave what is being followed. */

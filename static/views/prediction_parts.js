@@ -5,7 +5,7 @@ import { signal } from '@preact/signals';
 import { useEffect } from 'preact/hooks';
 
 import { lazy } from '../lib/lazy.js';
-import { announce } from '../state/notice.js';
+import { explain } from '../state/notice.js';
 
 /** @import {ViewPicture} from '../overlays/scene.js' */
 /** @import {Predicted} from '../state/predictions.js' */
@@ -84,11 +84,11 @@ export function hasPredictions() {
 /** Accept the selected prediction, else the surest of the view in hand. */
 export function acceptInHand() {
 	if (state.value) state.value.acceptInHand();
-	else announce('Nothing is predicted here.');
+	else explain('Nothing is predicted here.');
 }
 
 /** Accept the surest prediction of every view without a ball. */
 export function acceptAll() {
 	if (state.value) state.value.acceptAll();
-	else announce('Nothing is predicted here.');
+	else explain('Nothing is predicted here.');
 }

@@ -5,7 +5,7 @@ import { signal } from '@preact/signals';
 import { useEffect, useMemo } from 'preact/hooks';
 
 import { lazy } from '../lib/lazy.js';
-import { announce } from '../state/notice.js';
+import { explain } from '../state/notice.js';
 import { settledState, stateOf, waitingViews } from '../state/proposal_lines.js';
 
 /** @import {ViewProposalJson} from '../api/proposals.js' */
@@ -55,5 +55,5 @@ function load(state) {
 /** Accept what is proposed for the view in hand. */
 export function acceptProposed() {
 	if (loaded.value) loaded.value.acceptFocused();
-	else announce('Lines are proposed for views without a camera: every view here has one.');
+	else explain('Lines are proposed for views without a camera: every view here has one.');
 }

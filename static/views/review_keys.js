@@ -16,7 +16,7 @@ import { backToInstant, stepInstant } from '../state/instants.js';
 import { canSubmit } from '../state/leases.js';
 import { isHeld, suggestion, suggestions, nextSuggestion } from '../state/suggestions.js';
 import { goBy, goFlagged, goNext, goPrevious, historyAddress } from '../state/navigation.js';
-import { announce, dismiss, notice } from '../state/notice.js';
+import { announce, dismiss, explain, notice } from '../state/notice.js';
 import { revertSelected } from '../state/revert.js';
 import { swapWarning, swappedViews } from '../state/sides.js';
 import { annotateOwn, guidelinesShown, markGold } from '../state/independent_annotations.js';
@@ -53,7 +53,7 @@ function letterAt(index) {
 /** Focus a view; the second time show it alone. @param {number} index */
 function focusAt(index) {
 	const letter = letterAt(index);
-	if (!letter) announce(`There is no view ${index + 1}.`);
+	if (!letter) explain(`There is no view ${index + 1}.`);
 	else if (focused.value === letter) toggleMaximised(letter);
 	else focusView(letter);
 }
@@ -62,6 +62,7 @@ function focusAt(index) {
 function toggleIncluded(index) {
 	const view = group.value?.views[index];
 	if (view) submit({ kind: 'include', view: view.key, included: !view.included });
+	else explain(`There is no view ${index + 1}.`);
 }
 
 /** Leave one thing at a time. */
@@ -86,7 +87,7 @@ function zoomToBall() {
 	const center = (ball && ballCenter(ball)) ?? (place && { x: place[0], y: place[1] });
 	const stage = document.querySelector(`.image-panel[data-view="${focused.value}"] .image-panel__stage`);
 	if (!center || !stage) {
-		announce(`View ${focused.value} has no ball, and the other views do not locate it.`);
+		explain(`View ${focused.value} has no ball, and the other views do not locate it.`);
 		return;
 	}
 	const { width, height } = stage.getBoundingClientRect();
@@ -120,7 +121,7 @@ function changeBall(change, otherwise) {
 	const edit = view && change(view);
 	if (!view) return;
 	if (edit) submit(edit);
-	else announce(`${otherwise} ${view.letter}.`);
+	else explain(`${otherwise} ${view.letter}.`);
 }
 
 /** Left becomes right, for labels that somebody took from the other end: in the view that a finding names, else the focused one. */
@@ -130,7 +131,7 @@ function swap() {
 	if (!shown || !view) return;
 	const named = swappedViews(solution.value);
 	const elsewhere = named.length > 0 && !named.includes(view.key);
-	if (Object.keys(view.lines).length === 0) announce(`View ${view.letter} has no lines.`);
+	if (Object.keys(view.lines).length === 0) explain(`View ${view.letter} has no lines.`);
 	else if (elsewhere || swapWarning(shown, solution.value, view)) asking.value = 'swap';
 	else submit(swapSides(view));
 }
@@ -141,14 +142,14 @@ function takeBall() {
 	if (selected.value?.kind !== 'prediction' && acceptFollowedHere(view)) return;
 	const predicted = selected.value?.kind === 'prediction' || hasPredictions();
 	if (predicted || !view || view.balls.length > 0) acceptInHand();
-	else if (!placeExpected(view)) announce(`The other views do not tell where the ball is in view ${view.letter}. Press N to draw it.`);
+	else if (!placeExpected(view)) explain(`The other views do not tell where the ball is in view ${view.letter}. Press N to draw it.`);
 }
 
 /** Make the group of the view in hand, too. */
 function useView() {
 	const view = group.value?.views.find(({ letter }) => letter === focused.value);
 	if (!view) return;
-	if (view.included) announce(`View ${view.letter} is already used for the 3D ball.`);
+	if (view.included) explain(`View ${view.letter} is already used for the 3D ball.`);
 	else submit({ kind: 'include', view: view.key, included: true });
 }
 
@@ -313,7 +314,7 @@ const EDIT = [
 	{ keys: [']'], label: 'Ball larger by 0.25 px', group: 'Edit', needs: 'annotate', run: () => nudgeDiameter(1) },
 	{
 		keys: ['Delete', 'Backspace'], label: 'Delete the selected object', group: 'Edit', needs: 'annotate',
-		when: isSelected, run: deleteSelected,
+		run: deleteSelected,
 	},
 	{
 		keys: ['q'], label: 'Ball occluded, or not', group: 'Edit', needs: 'annotate',

@@ -6,7 +6,7 @@ import { raysInto } from '../overlays/scene.js';
 import { startBall, startMarking } from '../state/drawing.js';
 import { group, pending, solution, submit } from '../state/group.js';
 import { suggestion } from '../state/suggestions.js';
-import { announce } from '../state/notice.js';
+import { explain } from '../state/notice.js';
 import { zoomTo } from '../state/viewports.js';
 import { focusView, selected } from '../state/workspace.js';
 
@@ -59,13 +59,13 @@ function drawBall(shown, view) {
 function lookThere(view, [x, y]) {
 	showPlace(view, [{ x, y }]);
 	selected.value = { kind: 'ball', view: view.key };
-	announce('The ring is where the ball would have to be. If you see the ball there, move its box.');
+	explain('The ring is where the ball would have to be. If you see the ball there, move its box.');
 }
 
 /** An edit of the server builds on what it has: not on a change of the same lines or ball that is still on its way. @param {Edit} edit */
 function submitOffered(edit) {
 	const waits = edit.kind !== 'include' && pending.value.some(({ kind, view }) => kind === edit.kind && view === edit.view);
-	if (waits) announce('Your last change here is not saved yet. Try again in a moment.');
+	if (waits) explain('Your last change here is not saved yet. Try again in a moment.');
 	else submit(edit);
 }
 

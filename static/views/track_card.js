@@ -8,7 +8,7 @@ import { fixed, pixelText } from '../lib/format.js';
 import { useKeys } from '../lib/hooks.js';
 import { address, navigate } from '../lib/router.js';
 import { groupTrack, startGroupTrack, trackAround } from '../state/group_track.js';
-import { announce } from '../state/notice.js';
+import { explain } from '../state/notice.js';
 import { STATES } from '../state/tracks.js';
 import { verdictText } from './tracks/tracks_page.js';
 
@@ -25,7 +25,7 @@ function trackAddress() {
 const KEYS = [
 	{ keys: ['Shift+v'], label: 'Track of the ball, at this frame', group: 'View', run: () => {
 		if (groupTrack.value) navigate(trackAddress());
-		else announce('This group is in no track.');
+		else explain('This group is in no track.');
 	} },
 ];
 

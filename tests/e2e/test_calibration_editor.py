@@ -18,6 +18,7 @@ from tests.e2e.screen import (
     jobs_end,
     on_present,
     passing,
+    rows,
     settled,
     submitted,
     until,
@@ -194,6 +195,32 @@ class TestStaging:
         whole = {name: len(points) for name, points in before.items()}
         until(editor.page, lambda: editor.drawn() == whole)
         assert editor.lines == before
+
+    def test_undo_is_offered_once_there_is_something_to_undo(
+        self, open_page: OpenPage, server: str
+    ) -> None:
+        page = open_page(None)
+        groups = (page.request.get(f"/api/v1/groups/{row['id']}").json() for row in rows(page))
+        group = next(one for one in groups if not one["can_undo"] and not one["can_redo"])
+        editor = Editor(page, server, group["id"], 0)
+        undo, redo, discard = (
+            page.get_by_role("button", name=re.compile(f"^{name} "))
+            for name in ("Undo", "Redo", "Discard")
+        )
+        for button, why in (
+            (undo, "Nothing to undo"),
+            (redo, "Nothing to redo"),
+            (discard, "Nothing is staged"),
+        ):
+            expect(button).to_have_attribute("aria-disabled", "true")
+            button.click(force=True)
+            expect(page.locator(".explained")).to_have_text(f"{why}.")
+        editor.choose(longest(editor.lines))
+        editor.press(".", "Shift+ArrowDown")
+        expect(undo).to_have_attribute("aria-disabled", "false")
+        undo.click()
+        expect(undo).to_have_attribute("aria-disabled", "true")
+        expect(redo).to_have_attribute("aria-disabled", "false")
 
     def test_sides_are_swapped_before_anything_is_saved(self, editor: Editor) -> None:
         before = editor.drawn()

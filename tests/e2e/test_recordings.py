@@ -412,9 +412,17 @@ class TestInstants:
 
     def test_keys_that_can_do_nothing_say_why(self, recording: int, open_page: OpenPage) -> None:
         page = opened(open_page, recording)
-        for key, why in [("s", "begins with this frame"), ("Control+z", "nothing to undo")]:
+        for key, why in [
+            ("s", "begins with this frame"),
+            ("Control+z", "nothing to undo"),
+            ("w", "No frame is tracked."),
+            ("n", "This shot has no cameras yet."),
+            ("b", "This shot has no previous cameras."),
+            ("v", "No ball is followed in this shot."),
+            *((key, "No ball is followed in this frame.") for key in ("o", "u", "y", "Delete")),
+        ]:
             page.keyboard.press(key)
-            expect(page.get_by_text(why)).to_be_visible()
+            expect(page.locator(".explained")).to_contain_text(why)
         page.keyboard.press("ArrowDown")
         shows(page, 40)
         page.keyboard.press("ArrowDown")

@@ -195,6 +195,38 @@ class TestSayingOneThing:
         screen.saved()
 
 
+class TestExplanations:
+    def test_a_key_that_does_nothing_says_why_for_a_moment_and_moves_nothing(
+        self, open_page: OpenPage
+    ) -> None:
+        page = open_page("/review/1")
+        Screen(page).ready()
+        before = at_rest(page.locator(".image-grid"))
+        explained = page.locator(".explained span")
+        for key, why in (
+            ("6", "There is no view 6."),
+            ("Shift+6", "There is no view 6."),
+            ("d", "This is the first group of the queue."),
+            ("e", "No group with a finding comes before this one."),
+            ("Delete", "Select a point or a ball first."),
+            (".", "This dataset has no frames before or after this one."),
+        ):
+            page.keyboard.press(key)
+            expect(explained).to_have_text(why)
+            expect(explained).to_be_visible()
+        box = at_rest(explained)
+        assert box["y"] + box["height"] <= at_rest(page.locator(".header"))["height"]
+        assert at_rest(page.locator(".image-grid")) == before
+        page.evaluate("document.getAnimations().forEach((one) => one.finish())")
+        expect(explained).to_be_hidden()
+        page.keyboard.press("6")
+        expect(explained).to_be_visible()
+        # What the page shows anyway is only read out.
+        page.keyboard.press("p")
+        expect(explained).to_have_count(0)
+        page.keyboard.press("p")
+
+
 class TestPaint:
     def test_whiskers_lead_to_it_and_strips_show_it_once_it_is_asked_for(
         self, open_page: OpenPage, console: Any

@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { beforeEach, describe, it } from 'node:test';
 
-import { notice } from '../../static/state/notice.js';
+import { announced, notice } from '../../static/state/notice.js';
 import { makeShotList } from '../../static/state/shot_list.js';
 
 const shot = (first, last) => ({ first, last, kind: 'main', entered_by: 'cut', kept: null });
@@ -41,7 +41,7 @@ describe('a list of shots', () => {
 	it('says that there is nothing to undo', async () => {
 		const shots = await opened();
 		shots.undo();
-		assert.equal(notice.value?.text, 'There is nothing to undo.');
+		assert.deepEqual(announced.value, { text: 'There is nothing to undo.', shown: true });
 		assert.equal(asked.length, 0);
 	});
 

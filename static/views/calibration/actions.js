@@ -7,7 +7,7 @@ import { choice, commit, lines, mode, stageLines, view } from '../../state/calib
 import {
 	relabelled, sidesSwapped, withAdded, withInserted, withPoint, withoutMarking, withoutPoint,
 } from '../../state/line_changes.js';
-import { announce } from '../../state/notice.js';
+import { announce, explain } from '../../state/notice.js';
 import { viewportOf } from '../../state/viewports.js';
 import { panelKey } from './panel_key.js';
 
@@ -39,14 +39,14 @@ export function focusImage() {
 
 /** Begin or end to set points on the marking in hand. */
 export function toggleDrawing() {
-	if (!choice.value) announce('Choose a marking first.');
+	if (!choice.value) explain('Choose a marking first.');
 	else mode.value = mode.value === 'draw' ? 'select' : 'draw';
 }
 
 /** Begin or end to give the marking in hand another name. */
 export function toggleRelabelling() {
 	const chosen = choice.value;
-	if (!chosen || !lines.value[chosen.marking]) announce('Choose an annotated marking first.');
+	if (!chosen || !lines.value[chosen.marking]) explain('Choose an annotated marking first.');
 	else mode.value = mode.value === 'relabel' ? 'select' : 'relabel';
 }
 
@@ -55,7 +55,7 @@ export function insertPoint() {
 	const chosen = choice.value;
 	const at = view.value;
 	if (!chosen || !at) {
-		announce('Choose a marking first.');
+		explain('Choose a marking first.');
 		return;
 	}
 	const points = lines.value[chosen.marking] ?? [];
@@ -82,7 +82,10 @@ function middleOf(at) {
 /** Take the point in hand away, or the whole marking. */
 export function deleteChosen() {
 	const chosen = choice.value;
-	if (!chosen || !lines.value[chosen.marking]) return;
+	if (!chosen || !lines.value[chosen.marking]) {
+		explain('Choose an annotated marking first.');
+		return;
+	}
 	if (chosen.index === null) {
 		deleteMarking();
 		return;
@@ -96,7 +99,10 @@ export function deleteChosen() {
 
 export function deleteMarking() {
 	const chosen = choice.value;
-	if (!chosen || !lines.value[chosen.marking]) return;
+	if (!chosen || !lines.value[chosen.marking]) {
+		explain('Choose an annotated marking first.');
+		return;
+	}
 	stageLines(withoutMarking(lines.value, chosen.marking), `${chosen.marking} deleted`);
 	announce(`${chosen.marking} deleted.`);
 	choice.value = null;
@@ -105,7 +111,7 @@ export function deleteMarking() {
 /** Every marking gets the name that it has from the other side. */
 export function swapAllSides() {
 	if (Object.keys(lines.value).length === 0) {
-		announce('There are no lines to swap.');
+		explain('There are no lines to swap.');
 		return;
 	}
 	stageLines(sidesSwapped(lines.value), 'Sides swapped');
@@ -126,7 +132,7 @@ export function nudgePoint(dx, dy) {
 export function stepMarking(step) {
 	const names = Object.keys(lines.value).sort();
 	if (names.length === 0) {
-		announce('No lines are annotated in this view.');
+		explain('No lines are annotated in this view.');
 		return;
 	}
 	const at = choice.value ? names.indexOf(choice.value.marking) : step > 0 ? -1 : 0;

@@ -7,7 +7,7 @@ import {
 } from '../../state/calibration.js';
 import { group } from '../../state/group.js';
 import { reviewAddress } from '../../state/navigation.js';
-import { announce, dismiss, notice } from '../../state/notice.js';
+import { announce, dismiss, explain, notice } from '../../state/notice.js';
 import { proposeFromPaint, snapToPaint, togglePaint } from '../../state/paint.js';
 import { fitPanel, isZoomed, zoomTo } from '../../state/viewports.js';
 import { cycleGain, gain, overlaysHidden, projections } from '../../state/workspace.js';
@@ -50,13 +50,13 @@ function zoomToPoint() {
 function goToView(index) {
 	const [at, other] = [group.value, group.value?.views[index]];
 	if (at && other) navigate(editorAddress(at.id, other.key), { replace: true });
-	else announce(`There is no view ${index + 1}.`);
+	else explain(`There is no view ${index + 1}.`);
 }
 
 /** Move the points of the marking in hand. */
 function snapMarking() {
 	if (choice.value) snapToPaint(choice.value.marking);
-	else announce('Choose a marking first.');
+	else explain('Choose a marking first.');
 }
 
 const hasPoint = () => choice.value !== null && choice.value.index !== null;

@@ -4,8 +4,10 @@
 import { html } from 'htm/preact';
 
 import { fixed, pixelText } from '../../lib/format.js';
+import { explain } from '../../state/notice.js';
 import { asking, isWaiting, proposeFromPaint, snapToPaint } from '../../state/paint.js';
 import { changed, changes, choice, discardStaged, lines, mode, redo, staging, undo } from '../../state/calibration.js';
+import { redoable, undoable } from '../../state/undo.js';
 import { deleteChosen, deleteMarking, insertPoint, save, swapAllSides, toggleDrawing, toggleRelabelling } from './actions.js';
 
 /** @import {ViewPicture} from '../../overlays/scene.js' */
@@ -15,7 +17,7 @@ function Action({ label, keys, run, off = null, pressed }) {
 	return html`
 		<button
 			class="button" type="button" aria-disabled=${off !== null} aria-pressed=${pressed}
-			title=${off ?? `${label} (${keys})`} onClick=${() => { if (off === null) run(); }}
+			title=${off ?? `${label} (${keys})`} onClick=${() => { if (off === null) run(); else explain(`${off}.`); }}
 		>${label} <kbd>${keys}</kbd></button>
 	`;
 }
@@ -80,8 +82,8 @@ export function CommitBar({ shared }) {
 				${markings ? html`<strong>${markings} ${markings === 1 ? 'marking' : 'markings'} staged</strong> <span>${steps[at - 1]?.label ?? ''}</span>` : 'Nothing is staged.'}
 			</p>
 			<div class="commit__buttons">
-				<${Action} label="Undo" keys="Ctrl Z" run=${undo} />
-				<${Action} label="Redo" keys="Ctrl ⇧ Z" run=${redo} off=${at < steps.length ? null : 'Nothing to redo'} />
+				<${Action} label="Undo" keys="Ctrl Z" run=${undo} off=${at > 0 || undoable.value ? null : 'Nothing to undo'} />
+				<${Action} label="Redo" keys="Ctrl ⇧ Z" run=${redo} off=${at < steps.length || redoable.value ? null : 'Nothing to redo'} />
 				<${Action} label="Discard" keys="Ctrl Del" run=${discardStaged} off=${off} />
 				<button data-needs="annotate" class="button button--primary" type="button" aria-disabled=${off !== null} title=${off ?? 'Save everything staged as one edit (Ctrl S)'} onClick=${() => { if (off === null) save(); }}>
 					${shared ? 'Save for all its views' : 'Save'} <kbd>Ctrl S</kbd>

@@ -104,7 +104,7 @@ export function BallCard({ one, shot, balls }) {
 	const accepted = Boolean(run?.accepted_by);
 	const why = busy ? 'The ball is being followed' : run ? '' : 'No ball is followed in this frame';
 	const left = run ? run.uncertain - run.confirmed.length : 0;
-	const sure = ball?.state === 'uncertain' ? '' : 'This frame is not uncertain';
+	const sure = ball?.state === 'uncertain' ? '' : 'There is nothing to confirm at this frame';
 	/** @param {MouseEvent} event */
 	function jump(event) {
 		const { left: begin, width } = /** @type {HTMLElement} */ (event.currentTarget).getBoundingClientRect();

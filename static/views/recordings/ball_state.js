@@ -10,7 +10,7 @@ import { written } from '../../lib/keys.js';
 import { useResource } from '../../lib/resource.js';
 import { plural } from '../../lib/format.js';
 import { nextUncertain, runAt, uncertainAround } from '../../state/ball_runs.js';
-import { announce } from '../../state/notice.js';
+import { announce, explain } from '../../state/notice.js';
 import { goTo, stand, wanted } from '../../state/playback.js';
 
 /** @import {BallRunFrames, BallRunJson} from '../../api/ball_runs.js' */
@@ -41,6 +41,9 @@ import { goTo, stand, wanted } from '../../state/playback.js';
 const ASK_AGAIN = 700;
 /** What one press of an arrow moves the cross by, pixels of the recording. */
 const STEPS = { plain: 8, Shift: 40, Alt: 1 };
+
+const BUSY = 'The ball is being followed.';
+const NONE = 'No ball is followed in this frame.';
 
 /** @param {BallRunJson} run */
 const tag = ({ id, etag }) => `${id} ${etag}`;
@@ -80,6 +83,7 @@ export function useBalls(one, shot) {
 	});
 	/** @param {Place} at */
 	function click(at) {
+		if (busy) explain(BUSY);
 		if (busy || list.waiting) return;
 		stand();
 		const said = { frame, x: at.x, y: at.y };
@@ -91,26 +95,28 @@ export function useBalls(one, shot) {
 	}
 	/** @param {boolean} accepted */
 	function decide(accepted) {
-		if (busy) return;
-		if (!run) announce('No ball is followed in this frame.');
-		else if (Boolean(run.accepted_by) === accepted) announce(accepted ? 'This ball has been accepted already.' : 'Nothing to withdraw: this ball has not been accepted.');
+		if (busy) explain(BUSY);
+		else if (!run) explain(NONE);
+		else if (Boolean(run.accepted_by) === accepted) explain(accepted ? 'This ball has been accepted already.' : 'Nothing to withdraw: this ball has not been accepted.');
 		else ask(patchBallRun(one.id, run, { accepted }), ({ placed, kept, refused }) => (accepted
 			? `Accepted: the ball was added to ${plural(placed ?? 0, 'view')}${kept ? `; ${plural(kept, 'view')} already had one` : ''}${refused ? `; ${plural(refused, 'view')} could not be edited` : ''}.`
 			: refused ? `Not withdrawn: ${plural(refused, 'view')} could not be edited. Withdraw it again.` : 'Withdrawn: the balls that accepting added are removed.'));
 	}
 	function confirm() {
 		const around = run ? uncertainAround(run, frame) : [];
-		if (busy || !run) return;
-		if (!around.length) announce('This frame is not uncertain.');
+		if (busy) explain(BUSY);
+		else if (!run) explain(NONE);
+		else if (!around.length) explain('There is nothing to confirm at this frame.');
 		else ask(patchBallRun(one.id, run, { confirmed: [...run.confirmed, ...around] }), () => `${plural(around.length, 'frame')} confirmed.`);
 	}
 	function remove() {
-		if (busy || !run) return;
-		attempt(deleteBallRun(one.id, run.id), () => { list.reload(); announce('The followed ball is deleted.'); });
+		if (busy) explain(BUSY);
+		else if (!run) explain(NONE);
+		else attempt(deleteBallRun(one.id, run.id), () => { list.reload(); announce('The followed ball is deleted.'); });
 	}
 	function next() {
 		const place = nextUncertain(runs, frame);
-		if (place === null) announce(runs.length ? 'No frame is uncertain.' : 'No ball is followed in this shot.');
+		if (place === null) explain(runs.length ? 'No frame is uncertain.' : 'No ball is followed in this shot.');
 		else goTo(place);
 	}
 	const middle = { x: (one.width ?? 0) / 2, y: (one.height ?? 0) / 2 };

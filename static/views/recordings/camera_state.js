@@ -14,7 +14,7 @@ import { useResource } from '../../lib/resource.js';
 import { address, navigate, page } from '../../lib/router.js';
 import { worstFrame, nextUntracked } from '../../state/cameras.js';
 import { isOver, jobToShow } from '../../state/jobs.js';
-import { announce, inform } from '../../state/notice.js';
+import { announce, explain, inform } from '../../state/notice.js';
 import { goTo, wanted } from '../../state/playback.js';
 import { useEnded } from '../running_jobs.js';
 
@@ -44,6 +44,8 @@ import { useEnded } from '../running_jobs.js';
  * @property {() => void} turnLines
  */
 
+const NO_CAMERAS = 'This shot has no cameras yet.';
+
 /** @param {RecordingJson} one @param {Shot | undefined} shot @param {RunningJobs} running on the recording @returns {Cameras} */
 export function useCameras(one, shot, { jobs, watch }) {
 	const list = useResource((signal) => getCameraStretches(one.id, signal), [one.id]);
@@ -63,8 +65,13 @@ export function useCameras(one, shot, { jobs, watch }) {
 	useEnded(tracking, list.reload);
 	useEffect(() => listen('job', () => {}, list.reload), [one.id]);
 	const busy = jobs.some((one) => !isOver(one) && (one.kind === 'track' || one.id === drawing)) ? 'A job is running' : shot ? '' : 'This recording has no shot';
+	/** Whether nothing can be begun, which is said. */
+	function isBusy() {
+		if (busy) explain(`${busy}.`);
+		return busy !== '';
+	}
 	function track() {
-		if (busy || !shot) return;
+		if (isBusy() || !shot) return;
 		const asked = stretch && stretch.first <= shot.first && shot.last <= stretch.last ? stretch : shot;
 		attempt(postCameras(one.id, asked), async (begun) => {
 			const over = await watch(begun);
@@ -72,7 +79,8 @@ export function useCameras(one, shot, { jobs, watch }) {
 		});
 	}
 	function turnHalf() {
-		if (busy || !stretch) return;
+		if (isBusy()) return;
+		if (!stretch) { explain(NO_CAMERAS); return; }
 		const turned = !stretch.summary.turned;
 		attempt(turnCameras(one.id, stretch.first, turned), async (begun) => {
 			const over = await watch(begun);
@@ -81,7 +89,7 @@ export function useCameras(one, shot, { jobs, watch }) {
 	}
 	function takePitch() {
 		const other = stretch?.summary.pitch?.other;
-		if (busy || !other) return;
+		if (isBusy() || !other) return;
 		// Both at once: whoever leaves the page meanwhile finds the shot tracked on its pitch.
 		const size = getPitches(one.dataset).then(({ etag }) => setPitch(one.dataset, one.name, other, etag));
 		attempt(size.then(() => postCameras(one.id, stretch)), async (begun) => {
@@ -91,7 +99,7 @@ export function useCameras(one, shot, { jobs, watch }) {
 		});
 	}
 	function correct() {
-		if (busy) return;
+		if (isBusy()) return;
 		attempt(postInstants(one.id, [frame], { propose: false, linked: false }), async (begun) => {
 			setDrawing(begun.id);
 			const over = await watch(begun);
@@ -111,15 +119,15 @@ export function useCameras(one, shot, { jobs, watch }) {
 	const frames = id < 0 || found.waiting && found.value?.first !== id ? null : found.value;
 	/** @param {number | null | undefined} place @param {string} none */
 	const jump = (place, none) => {
-		if (place === null || place === undefined) announce(none);
+		if (place === null || place === undefined) explain(none);
 		else goTo(place);
 	};
 	return {
 		stretch, frames, before: old, lines, job, error: error ?? found.error ?? list.error, busy, track, correct, turnHalf, takePitch,
 		worst: () => jump(frames && worstFrame(frames), 'No frame is tracked.'),
-		untracked: () => jump(frames && nextUntracked(frames, wanted.value), frames ? 'Every frame is tracked.' : 'This shot has no cameras yet.'),
+		untracked: () => jump(frames && nextUntracked(frames, wanted.value), frames ? 'Every frame is tracked.' : NO_CAMERAS),
 		turnBefore: () => {
-			if (!stretch?.before) return;
+			if (!stretch?.before) { explain('This shot has no previous cameras.'); return; }
 			setBefore(!old);
 			announce(old ? 'Showing the present cameras.' : 'Showing the previous cameras.');
 		},

@@ -14,7 +14,7 @@ import { useResource } from '../../lib/resource.js';
 import { navigate, page } from '../../lib/router.js';
 import { useDataset } from '../../state/datasets.js';
 import { instantBeside, markOf, replayFrameAt, withInstant } from '../../state/links.js';
-import { announce, complain, inform } from '../../state/notice.js';
+import { announce, complain, explain } from '../../state/notice.js';
 import { makePlayer } from '../../state/playback.js';
 import { clockOf, matchTime, timecode } from '../../state/shots.js';
 import { ConfirmButton } from '../confirm_button.js';
@@ -73,7 +73,7 @@ function useLink(first) {
 			complain(`Another person changed this link. Load the page again to see the new state: ${problem.message}`);
 		}
 	}
-	return { link, change, reload, undo: () => change(() => { const last = before.current.pop(); if (!last) inform('There is nothing to undo.'); return last ?? null; }, 'Undone.', false) };
+	return { link, change, reload, undo: () => change(() => { const last = before.current.pop(); if (!last) explain('There is nothing to undo.'); return last ?? null; }, 'Undone.', false) };
 }
 
 /** @param {{side: Side, shot: LinkedShot, player: Player, one: RecordingJson, focused: boolean, focus: () => void, mark: string}} props */
@@ -155,7 +155,7 @@ function Both({ first, recordings }) {
 		players.replay.goTo(replay);
 	}
 	function playTogether() {
-		if (!usable) return;
+		if (!usable) { explain('Link two instants first.'); return; }
 		const next = !together;
 		setTogether(next);
 		setSide('live');
@@ -176,6 +176,7 @@ function Both({ first, recordings }) {
 	function showBeside(way) {
 		const next = instantBeside(link.instants, side, players[side].wanted.value, way);
 		if (next) show(next);
+		else explain(`No linked instant comes ${way < 0 ? 'before' : 'after'} this frame.`);
 	}
 	const doing = useRef({ player: players.live, focus, linkHere, playTogether, showBeside, undo, second: 25 });
 	doing.current = { player: players[side], focus, linkHere, playTogether, showBeside, undo, second: Math.round(recordings[side].fps ?? 25) };

@@ -1,7 +1,7 @@
 // @ts-check
 /** Keys of the page of a recording. */
 
-import { inform } from '../../state/notice.js';
+import { explain } from '../../state/notice.js';
 import { goTo, run, stand, stepBy, toggleRunning, wanted } from '../../state/playback.js';
 import { changedAt, mergedWithNext, SHOT_KINDS, shotAt, splitAt } from '../../state/shots.js';
 
@@ -27,7 +27,7 @@ export function keysOfRecording(one, shots, doing) {
 	/** @param {Partial<Shot>} change @param {string} told */
 	const set = (change, told) => doing.current.change(changedAt(shots(), at(), change), told);
 	/** @param {Shot[] | null} items @param {string} told @param {string} why nothing can be done here */
-	const change = (items, told, why) => { if (items) doing.current.change(items, told); else inform(why); };
+	const change = (items, told, why) => { if (items) doing.current.change(items, told); else explain(why); };
 	const second = Math.round(one.fps ?? 25);
 	const [look, edit] = ['Recording', 'Shots'];
 	return [

@@ -2,7 +2,7 @@
 /** Keys of the 3D view while it is shown. */
 
 import { group } from '../../state/group.js';
-import { announce } from '../../state/notice.js';
+import { explain } from '../../state/notice.js';
 import { goToPreset, lookThrough, sceneShown, standpoint } from '../../state/scene3d.js';
 import { leaveCamera } from './gestures.js';
 import { approached, turned } from './standpoints.js';
@@ -62,7 +62,7 @@ function notScrolling() {
 function throughCamera(index) {
 	const view = group.value?.views[index];
 	if (view) lookThrough(view.letter);
-	else announce(`There is no view ${index + 1}.`);
+	else explain(`There is no view ${index + 1}.`);
 }
 
 /** @param {() => void} leave */

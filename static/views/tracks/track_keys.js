@@ -2,7 +2,7 @@
 /** Keys of the page of a track. */
 
 import { navigate } from '../../lib/router.js';
-import { inform } from '../../state/notice.js';
+import { explain } from '../../state/notice.js';
 import { contradictedAfter, eventAt, eventBy, EVENTS } from '../../state/tracks.js';
 
 /** @import {EventKind, TrackFrames, TrackJson} from '../../api/tracks.js' */
@@ -62,16 +62,17 @@ export function keysOfTrack(doing) {
 			const { frames, track, at } = doing.current;
 			const group = frames?.group[at - track.first];
 			if (group) navigate(`/review/${group}`);
+			else explain('This frame has no group.');
 		} },
 		{ keys: ['a'], label: 'Accept the track, and go to the next one', group: say, needs: 'review', run: () => doing.current.judge('accepted') },
 		{ keys: ['x'], label: 'Reject the track, and go to the next one', group: say, needs: 'review', run: () => doing.current.judge('rejected') },
 		{ keys: ['u'], label: 'Withdraw the verdict', group: say, needs: 'review', run: () => doing.current.judge('none') },
 		{ keys: ['f'], label: 'Next track that waits for a verdict', group: say, run: () => { doing.current.goOn(); } },
-		...EVENTS.map(({ kind, key }) => /** @type {Binding} */ ({ keys: [key], label: `Add a ${kind === 'out' ? 'ball out' : kind} at this frame`, group: say, needs: 'review', run: () => doing.current.correct(kind, true) })),
+		...EVENTS.map(({ kind, key }) => /** @type {Binding} */ ({ keys: [key], label: kind === 'out' ? 'Mark the ball out of play at this frame' : `Add a ${kind} at this frame`, group: say, needs: 'review', run: () => doing.current.correct(kind, true) })),
 		{ keys: ['d'], label: 'Remove the event at this frame', group: say, needs: 'review', run: () => {
 			const event = eventAt(doing.current.frames?.events ?? [], doing.current.at);
 			if (event) doing.current.correct(event.kind, false);
-			else inform('There is no event near this frame to remove.');
+			else explain('There is no event near this frame to remove.');
 		} },
 		{ keys: ['Ctrl+z'], label: 'Undo the last verdict or change of events, also of the track before', group: say, needs: 'review', run: () => doing.current.undo() },
 	];

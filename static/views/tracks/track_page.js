@@ -15,7 +15,7 @@ import { address, navigate, page, param, place } from '../../lib/router.js';
 import { stored } from '../../lib/storage.js';
 import { useDataset } from '../../state/datasets.js';
 import { me } from '../../state/me.js';
-import { announce, complain, dismiss, inform } from '../../state/notice.js';
+import { announce, complain, dismiss, explain, inform } from '../../state/notice.js';
 import { listValues, nextOpen, trackAddress } from '../../state/track_list.js';
 import { makeTrackPlayer, PACES } from '../../state/track_player.js';
 import { amid, contradictedAfter, corrected, curvesOf, eventAt, EVENTS, forgetTrackChange, jumpText, lastTrackChange, MODES, mostShown, partOf, rememberTrack, runsOf, STATES, undoOfTrack } from '../../state/tracks.js';
@@ -320,7 +320,7 @@ function Track({ track, setTrack }) {
 	async function undoNow() {
 		if (!isHere()) return;
 		const change = lastTrackChange(track.dataset);
-		if (!change) { inform('There is nothing to undo.'); return; }
+		if (!change) { explain('There is nothing to undo.'); return; }
 		try {
 			const present = change.track === track.id ? newest.current : await getTrack(change.track);
 			const body = undoOfTrack(change, present);
