@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
+from tests.e2e.screen import Screen, rows, until
 from tests.e2e.screen import at_rest as box_of
-from tests.e2e.screen import rows, until
 
 OpenPage = Callable[..., Page]
 SIZES = {
@@ -73,6 +73,19 @@ WIDEST = """() => {
   for (const value of document.querySelectorAll('.mini-pitch [data-number]')) value.textContent = '−132.14 m';
 }"""
 
+LISTED = """async () => {
+  const list = document.querySelector('.object-list');
+  const covered = [];
+  for (let i = 0; i < list.querySelectorAll('button').length - 1; i++) {
+    list.querySelectorAll('button')[i].focus();
+    await new Promise((seen) => requestAnimationFrame(() => requestAnimationFrame(seen)));
+    const { left, right } = list.getBoundingClientRect();
+    const [name, point] = [...list.querySelectorAll('[aria-pressed=true] span')].map((span) => span.textContent);
+    covered.push({ name, point, left, right });
+  }
+  return covered;
+}"""
+
 
 def group_of(page: Page, views: int) -> int:
     """A group of the sample with that many views, one that passes first."""
@@ -117,6 +130,31 @@ def picture_share(page: Page, letter: str) -> float:
     """Share of a panel that is not as dark as the stage behind the picture."""
     pixels = stage_pixels(page, letter).astype(int)
     return float((pixels.max(axis=2) > 28).mean())
+
+
+class TestObjectList:
+    @pytest.mark.parametrize("size", ["1440", "1100"])
+    def test_it_never_lies_over_the_selected_object(self, open_page: OpenPage, size: str) -> None:
+        page = opened(open_page, 3, size)
+        screen = Screen(page)
+        for number, view in enumerate(screen.document()["views"][1:], 2):
+            page.keyboard.press(str(number))
+            page.keyboard.press("i")
+            expect(page.locator(".object-list [aria-pressed=true]")).to_contain_text("Ball")
+            seen = page.evaluate(LISTED)
+            assert len(seen) > 10
+            start, end = (screen.place(view, x, 0)[0] for x in (0, view["width"]))
+            for at in seen:
+                if at["name"] == "Ball":
+                    left, _, width, _ = view["balls"][0]["box"]
+                    place = left + width / 2
+                else:
+                    point = view["lines"][at["name"]][int(at["point"].removeprefix("point ")) - 1]
+                    place = point["x"]
+                x = start + (end - start) * place / view["width"]
+                assert not at["left"] <= x <= at["right"], at
+            page.keyboard.press("Escape")
+            page.keyboard.press("Escape")
 
 
 class TestArrangement:
