@@ -67,7 +67,7 @@ def open_version(
 
 def _place(source: str | Path | Client) -> Path | Client:
     """The file, folder or server that is meant."""
-    if isinstance(source, Client):
+    if not isinstance(source, str | Path):
         return source
     is_address = isinstance(source, str) and source.startswith(("http://", "https://"))
     return Client(str(source)) if is_address else Path(source)

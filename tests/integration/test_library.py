@@ -64,7 +64,9 @@ class TestOpen:
         (kept,) = (cache / "versions").iterdir()
         assert kept.name.startswith(frozen["hash"])
         before = kept.stat().st_mtime_ns
-        again = library.open(library.Client(address), frozen["hash"][:12], dataset="small", cache=cache)
+        again = library.open(
+            library.Client(address), frozen["hash"][:12], dataset="small", cache=cache
+        )
         assert (again.groups, kept.stat().st_mtime_ns) == (version.groups, before)
 
     def test_nothing_is_left_on_the_server(
@@ -99,11 +101,8 @@ class TestOpen:
         target = tmp_path / "versions" / kept.name.replace(frozen["hash"], stranger["hash"])
         target.parent.mkdir()
         target.write_bytes(kept.read_bytes())
-        client = _Naming(stranger)
-        with pytest.MonkeyPatch.context() as patched:
-            patched.setattr("touchline.opening.Client", lambda _address: client)
-            with pytest.raises(HashError, match=f"Delete {target} and open the version again"):
-                library.open(address, "library", dataset="small", cache=tmp_path)
+        with pytest.raises(HashError, match=f"Delete {target} and open the version again"):
+            library.open(_Naming(stranger), "library", dataset="small", cache=tmp_path)
 
     def test_what_is_not_there_is_told_with_what_is(self, address: str, cache: Path) -> None:
         with pytest.raises(DataError, match="There are: library"):
