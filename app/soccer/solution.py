@@ -13,7 +13,7 @@ from app.soccer.choices import GoalEdge
 from app.soccer.finding import Finding
 from app.soccer.frames import Box, ImagePoint, height_above_grass
 
-SOLVER_VERSION = "11"
+SOLVER_VERSION = "12"
 """Part of every solution's key; raised by one whenever a number changes."""
 
 GAMMAS_PERCENT = (0.5, 1.0, 2.0)

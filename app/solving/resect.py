@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from app.errors import DegenerateGeometryError
 from app.geometry.arrays import FloatArray, IntArray
 from app.geometry.camera import Camera
 from app.geometry.least_squares import LeastSquaresResult, require_determined_parameters
@@ -118,6 +119,8 @@ POINTS_PER_LINE, POINTS_PER_CIRCLE = 4, 8
 
 CONTRADICTION = 64.0
 """A prior of the position that costs the lines more than this, in clicks' variances, is dropped."""
+ROLLED, ROLL_SIGMAS = float(np.radians(2)), 4.0
+"""A camera is rolled beyond this (radians) that is known to so many standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -239,24 +242,41 @@ class ResectionProblem:
         Where the lines determine the camera this changes nothing; where they leave a direction
         open the stadium closes it. A replay, which may stand anywhere, is left alone.
         """
-        if not is_main_position(fit.parameters[X : Z + 1]):
-            return fit
-        return self._refine_near_position(fit, observations, STADIUM)
+        return self._refine_main_camera(fit, observations, STADIUM)
 
     def refine_with_match_position(
         self, alone: Resection, observations: Observations, near: PositionPrior
     ) -> Resection:
-        """The camera once more with what other frames of its match say of the position.
+        """The camera once more with what other frames of its match say of the position."""
+        return self._refine_main_camera(alone, observations, near)
 
-        A camera that does not stand like a main camera is left alone, and so is one whose lines
-        contradict the prior.
+    def _refine_main_camera(
+        self, alone: Resection, observations: Observations, near: PositionPrior
+    ) -> Resection:
+        """The camera once more with a prior of its roll and position.
+
+        A camera that does not stand like a main camera or is clearly rolled is left alone, and so
+        is one whose lines contradict the prior.
         """
         if not is_main_position(alone.parameters[X : Z + 1]):
             return alone
-        shared = self._refine_near_position(alone, observations, near)
+        if self._is_clearly_rolled(alone, observations):
+            return alone
+        refined = self._refine_near_position(alone, observations, near)
         variance = self.click_variance(alone.parameters, observations)
-        loss = self._data_cost(shared, observations) - self._data_cost(alone, observations)
-        return shared if 2 * loss <= CONTRADICTION * variance else alone
+        loss = self._data_cost(refined, observations) - self._data_cost(alone, observations)
+        return refined if 2 * loss <= CONTRADICTION * variance else alone
+
+    def _is_clearly_rolled(self, fit: Resection, observations: Observations) -> bool:
+        """Whether the lines say that the camera is rolled, as no main camera is."""
+        roll = abs(float(fit.parameters[ROLL]))
+        if roll <= ROLLED:
+            return False
+        try:
+            covariance = self.line_noise(fit.parameters, observations).parameters
+        except DegenerateGeometryError:
+            return False
+        return roll > ROLL_SIGMAS * float(np.sqrt(covariance[ROLL, ROLL]))
 
     def _refine_near_position(
         self, fit: Resection, observations: Observations, near: PositionPrior

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -51,6 +53,16 @@ class TestRefineMain:
     @pytest.mark.parametrize("camera", [BEHIND_GOAL, OPPOSITE], ids=["behind goal", "opposite"])
     def test_a_replay_is_left_alone(self, camera):
         observations = make_observations(click(camera, 1.0), PITCH, SIZE)
+        fit = PROBLEM.resect(observations)
+        assert PROBLEM.refine_with_main_prior(fit, observations) is fit
+
+    @pytest.mark.parametrize("degrees", [-25.0, 4.0, 12.0])
+    def test_a_camera_that_its_lines_show_rolled_is_left_alone(self, degrees):
+        level = looking((12.0, 55.0, -14.0), (20.0, -4.0, 0.0), 1200.0)
+        c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        rolled = replace(level, rotation=turn @ level.rotation)
+        observations = make_observations(click(rolled, 1.0), PITCH, SIZE)
         fit = PROBLEM.resect(observations)
         assert PROBLEM.refine_with_main_prior(fit, observations) is fit
 
