@@ -102,9 +102,20 @@ def opposite_marking(marking: str) -> str:
     return " ".join(_SWAP.get(word, word) for word in marking.split(" "))
 
 
+def mirrored_marking(marking: str) -> str:
+    """The marking that this one becomes when left and right of the pitch are exchanged as in a mirror.
+
+    Example:
+        >>> mirrored_marking("Goal left post left"), mirrored_marking("Side line top")
+        ('Goal right post right', 'Side line top')
+    """
+    return " ".join(_MIRROR.get(word, word) for word in marking.split(" "))
+
+
 _KNOWN = frozenset(MARKINGS)
 _LOOSE = {_keep_letters_and_digits(marking): marking for marking in MARKINGS}
 _SWAP = {"left": "right", "right": "left", "top": "bottom", "bottom": "top"}
+_MIRROR = {"left": "right", "right": "left"}
 
 
 @dataclass(frozen=True)

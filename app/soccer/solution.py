@@ -104,6 +104,25 @@ class PictureDistortion:
 
 
 @dataclass(frozen=True)
+class OtherPitch:
+    """Another size of the pitch, which the lines of a frame alone show.
+
+    Attributes:
+        size: Length and width that they show, metres.
+        used: Length and width that the camera was found on, metres.
+        off_m: How far the one of both that is clearer lies from the one in use.
+        threshold_m: It counts beyond this.
+        explains: Markings that look mislabelled on the one in use and lie where this pitch has them.
+    """
+
+    size: tuple[float, float]
+    used: tuple[float, float]
+    off_m: float
+    threshold_m: float
+    explains: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class PaintFit:
     """How a camera and the paint of its picture agree.
 
@@ -154,6 +173,9 @@ class Calibration:
             of a match have it in common, so it says nothing of how their rays miss each other.
         goal: Which line of the goals and of the paint the distances are to; JaC is told by inner edges
             and the plan.
+        mirrored_px: Largest distance of its points, pixels, once left and right are exchanged in the
+            names of its markings, where only then a camera can stand where it does.
+        other_pitch: The one that the lines of a frame alone show; the camera is found on that in use.
     """
 
     source: str
@@ -170,6 +192,8 @@ class Calibration:
     picture_covariance: tuple[float, ...] | None = field(default=None, metadata={"later": True})
     pitch_covariance: tuple[float, ...] | None = field(default=None, metadata={"later": True})
     goal: GoalEdge = field(default="inner", metadata={"later": True})
+    mirrored_px: float | None = field(default=None, metadata={"later": True})
+    other_pitch: OtherPitch | None = field(default=None, metadata={"later": True})
 
     @property
     def has_known_covariance(self) -> bool:

@@ -39,7 +39,7 @@ from app.solving.jaccard import (
     project_markings,
     project_markings_like_evaluator,
 )
-from app.solving.labels import find_suspects
+from app.solving.labels import find_suspects, measure_mirrored_lines
 from app.solving.lone_frame import LoneFrameUncertainty, estimate_lone_frame_uncertainty
 from app.solving.observations import Observations, make_observations
 from app.solving.paint_camera import PaintProblem, solve_paint
@@ -102,9 +102,13 @@ def calibrate(
     if policy.check_labels:
         fit, observations, suspects = find_suspects(problem, observations, fit)
     fit = problem.refine_with_main_prior(fit, observations)
+    mirrored_px = measure_mirrored_lines(problem, fit, make_observations(lines, pitch, size))
     picture = find_picture_distortion(problem, fit.parameters, observations)
     found = replace(
-        _make_calibration(problem, fit, observations), suspects=suspects, picture=picture
+        _make_calibration(problem, fit, observations),
+        suspects=suspects,
+        picture=picture,
+        mirrored_px=mirrored_px,
     )
     return measure_calibration(
         found, lines, pitch, size, shortest_px=min_counted_marking_px(policy, size)
@@ -213,13 +217,15 @@ def analyse_lone_frame(
     )
 
 
-def add_lone_frame_covariance(
-    found: Calibration, alone: LoneFrameUncertainty | None
+def add_lone_frame_uncertainty(
+    found: Calibration, alone: LoneFrameUncertainty | None, pitch: Pitch
 ) -> Calibration:
-    """The calibration with that in its covariance; what the lines determine they still do."""
-    return (
-        found if alone is None else replace(found, covariance=flatten_covariance(alone.covariance))
-    )
+    """The calibration with that in its covariance, and with the other pitch that the lines show;
+    what the lines determine they still do."""
+    if alone is None:
+        return found
+    covariance = flatten_covariance(alone.covariance)
+    return replace(found, covariance=covariance, other_pitch=alone.find_other_pitch(pitch))
 
 
 def _covariances_with_picture(
@@ -369,7 +375,7 @@ def calibrate_view(
         return found
     station = view.station
     alone = analyse_lone_frame(found, station.lines, group.pitch, station.size, policy)
-    return add_lone_frame_covariance(found, alone)
+    return add_lone_frame_uncertainty(found, alone, group.pitch)
 
 
 def calibrate_from_clicks(group: Group, view: View, policy: CalibrationPolicy) -> Calibration:

@@ -11,16 +11,14 @@ from app.soccer.frames import ImageSize, height_above_grass
 from app.soccer.group import Group, View
 from app.soccer.paint_evidence import NO_FRAME, NO_PAINT, PAINT_DISAGREES
 from app.soccer.picture import size_centred_on_principal_point
-from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.soccer.solution import Calibration, ViewSolution
 from app.solving.calibrate import MAX_POSITION_SIGMA_M, find_wanted_paint_reading
-from app.solving.lone_frame import OTHER_M, OTHER_SIGMAS, LoneFrameUncertainty
+from app.solving.camera_positions import MAX_CAMERA_DISTANCE_M, MAX_CAMERA_HEIGHT_M
+from app.solving.labels import FITS, GAMMA_SHARE
 from app.solving.picture_camera import BELIEVED, MIN_SHIFT, MIN_STRETCH
 from app.wording import format_metres, format_pixels
 
-MAX_CAMERA_HEIGHT_M = 100.0
-MAX_CAMERA_DISTANCE_M = 250.0
 BAD_POINT_GAMMA = 2.0
 """A point is bad when it lies farther than this from its marking, in units of gamma ..."""
 GOOD_POINT_GAMMA = 1.0
@@ -43,12 +41,17 @@ def find_calibration_findings(
         size: Annotated size.
         view: Key of the view, for findings of a group.
     """
+    if calibration.mirrored_px is not None:
+        # What else looks wrong follows from it.
+        yield _make_mirrored_finding(calibration.mirrored_px, size, view)
+        return
     slips = _find_misplaced_points(calibration, size)
     yield from _find_wrong_labels(calibration, slips, view)
     yield from _make_bad_point_findings(slips, size, view)
     yield from _find_unannotated_markings(calibration, size, view)
     yield from _find_unconstrained_parameters(calibration, view)
     yield from _find_picture_distortions(calibration, size, view)
+    yield from _find_other_pitch(calibration, view)
     yield from _find_camera_size_mismatch(calibration, size, view)
     yield from _find_implausible_camera(calibration, view)
 
@@ -200,28 +203,22 @@ def _find_picture_distortions(
     )
 
 
-def find_pitch_findings_of_lone_frame(
-    alone: LoneFrameUncertainty | None, pitch: Pitch
-) -> Iterator[Finding]:
-    """The findings about the pitch from the lines of one frame alone.
-
-    Args:
-        alone: What nobody else says of it; None where it is said.
-        pitch: The one that it was calibrated on.
-    """
-    other = None if alone is None else alone.clearly_different_pitch(pitch)
-    if alone is None or other is None:
+def _find_other_pitch(calibration: Calibration, view: str | None) -> Iterator[Finding]:
+    """The pitch of another size that the lines of a frame alone show."""
+    other = calibration.other_pitch
+    if other is None:
         return
-    off = np.abs([other.length - pitch.length, other.width - pitch.width])
-    axis = int(np.argmax(off / alone.sizes_sigma))
-    names = " and ".join(f"“{name}”" for name in alone.explains)
-    where = f"; {names} {'lies' if len(alone.explains) == 1 else 'lie'} there, too" if names else ""
+    names = " and ".join(f"“{name}”" for name in other.explains)
+    where = f"; {names} {'lies' if len(other.explains) == 1 else 'lie'} there, too" if names else ""
+    length, width = other.size
+    used_length, used_width = other.used
     yield Finding(
         PITCH_SIZE,
-        f"The lines show a pitch of {other.length:g} x {other.width:g} m, but the camera was "
-        f"computed for {pitch.length:g} x {pitch.width:g} m{where}. Its position is uncertain by this difference.",
-        number=float(off[axis]),
-        threshold=max(OTHER_M, OTHER_SIGMAS * float(alone.sizes_sigma[axis])),
+        f"The lines show a pitch of {length:g} x {width:g} m, but the camera was "
+        f"computed for {used_length:g} x {used_width:g} m{where}. Its position is uncertain by this difference.",
+        view,
+        number=other.off_m,
+        threshold=other.threshold_m,
     )
 
 
@@ -279,6 +276,18 @@ def _find_implausible_camera(calibration: Calibration, view: str | None) -> Iter
             "lines."
         )
         yield Finding("implausible_camera", sentence, view, number=number, threshold=threshold)
+
+
+def _make_mirrored_finding(error_px: float, size: ImageSize, view: str | None) -> Finding:
+    return Finding(
+        "implausible_camera",
+        "The picture or the names of its lines are mirrored: no camera shows them like this, but with "
+        f"“left” and “right” exchanged in all names their points lie within {format_pixels(error_px)} of their "
+        "lines. Exchange the names, or import the picture as it was taken.",
+        view,
+        number=error_px,
+        threshold=FITS * GAMMA_SHARE * size.diagonal,
+    )
 
 
 READ_PAINT = "read_paint"

@@ -9,8 +9,11 @@ import numpy as np
 from app.geometry.arrays import FloatArray
 from app.geometry.resection import PARAMETERS
 from app.geometry.resection_kernels import aim_starting_cameras
+from app.soccer.frames import height_above_grass
 from app.solving.observations import Observations
 
+MAX_CAMERA_HEIGHT_M, MAX_CAMERA_DISTANCE_M = 100.0, 250.0
+"""Above the grass, and from the centre mark: no camera stands farther off."""
 MAIN_STAND_X_M, MAIN_STAND_Y_M, MAIN_STAND_Z_M = (-20.0, 20.0), (38.0, 110.0), (-30.0, -6.0)
 """A camera that stands within these bounds (pitch frame) is a main camera."""
 MAIN_MEAN = np.array([0.0, 0.0, 64.5, -15.5])
@@ -53,6 +56,12 @@ def is_main_position(position: FloatArray) -> bool:
     """Whether main cameras stand there (pitch frame, metres, shape (3,))."""
     low, high = np.transpose([MAIN_STAND_X_M, MAIN_STAND_Y_M, MAIN_STAND_Z_M])
     return bool(((low < position) & (position < high)).all())
+
+
+def is_possible_position(position: FloatArray) -> bool:
+    """Whether a camera can stand there (pitch frame, metres, shape (3,))."""
+    height, distance = height_above_grass(float(position[2])), float(np.hypot(*position[:2]))
+    return 0 < height <= MAX_CAMERA_HEIGHT_M and distance <= MAX_CAMERA_DISTANCE_M
 
 
 STANDS: FloatArray = np.array(

@@ -40,6 +40,7 @@ _BY_WEIGHT = (
     "views_contradict",
     "implausible_camera",
     "picture_geometry",
+    "pitch_size",
     "under_constrained",
     "paint_disagrees",
     "bad_point",

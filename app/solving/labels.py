@@ -14,10 +14,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.geometry.arrays import FloatArray
+from app.geometry.resection import X, Z
 from app.soccer.pitch import CIRCLES, MARKINGS
 from app.soccer.solution import SuspectLabel
+from app.solving.camera_positions import is_possible_position
 from app.solving.observations import Observations
-from app.solving.resect import Resection, ResectionProblem, count_measurements
+from app.solving.resect import (
+    Resection,
+    ResectionProblem,
+    count_measurements,
+    has_few_measurements,
+)
 
 GAMMA_SHARE = 0.005
 """Gamma as a share of the diagonal; the distances below are in units of it."""
@@ -111,6 +118,28 @@ def find_suspects(
         rest = observations.without(*(doubt.marking for doubt in suspects))
         fit = problem.refine(rest, fit.parameters[None])
     return fit, rest, tuple(search.to_suspect(doubt) for doubt in suspects)
+
+
+def measure_mirrored_lines(
+    problem: ResectionProblem, fit: Resection, observations: Observations
+) -> float | None:
+    """Largest distance of the points, pixels, once left and right are exchanged in all labels.
+
+    Args:
+        problem: The image.
+        fit: The camera from the labels as they are.
+        observations: All annotated points.
+
+    Returns:
+        None where the camera can stand where it does, and where they fit no better then.
+    """
+    if is_possible_position(fit.parameters[X : Z + 1]) or has_few_measurements(observations):
+        return None
+    mirrored = observations.mirrored()
+    found = problem.resect(mirrored)
+    worst = float(problem.distances(found.parameters, mirrored).max())
+    fits = worst <= FITS * GAMMA_SHARE * problem.size.diagonal and found.cost < fit.cost
+    return worst if fits and is_possible_position(found.parameters[X : Z + 1]) else None
 
 
 @dataclass(frozen=True)

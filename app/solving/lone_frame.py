@@ -33,6 +33,7 @@ from app.geometry.resection import (
 from app.soccer.picture import ASPECTS, MAX_SHIFT
 from app.soccer.pitch import LENGTH_RANGE, MARKINGS, WIDTH_RANGE, Pitch
 from app.soccer.policy import CalibrationPolicy
+from app.soccer.solution import OtherPitch
 from app.solving.labels import GAMMA_SHARE, RELABELLED
 from app.solving.line_noise import compute_line_noise
 from app.solving.observations import Observations, pitch_curves
@@ -101,15 +102,23 @@ class LoneFrameUncertainty:
     sizes_sigma: FloatArray
     explains: tuple[str, ...] = ()
 
-    def clearly_different_pitch(self, pitch: Pitch) -> Pitch | None:
-        """The size that the lines show, to a decimetre, where it certainly is another one."""
+    def find_other_pitch(self, pitch: Pitch) -> OtherPitch | None:
+        """The size that the lines show, to a decimetre, where it certainly is not that of a pitch."""
         found = np.array([self.pitch.length, self.pitch.width])
         used = np.array([pitch.length, pitch.width])
-        off = np.abs(found - used) > np.maximum(OTHER_SIGMAS * self.sizes_sigma, OTHER_M)
-        if not off.any():
+        off, limit = np.abs(found - used), np.maximum(OTHER_SIGMAS * self.sizes_sigma, OTHER_M)
+        if not (off > limit).any():
             return None
-        length, width = np.where(off, found, used).round(1).tolist()
-        return replace(pitch, length=length, width=width)
+        size = np.where(off > limit, found, used).round(1)
+        off = np.abs(size - used)
+        axis = int(np.argmax(off / self.sizes_sigma))
+        return OtherPitch(
+            tuple(size.tolist()),
+            (pitch.length, pitch.width),
+            float(off[axis]),
+            float(limit[axis]),
+            self.explains,
+        )
 
 
 def estimate_lone_frame_uncertainty(
@@ -180,7 +189,8 @@ class _UnknownPitchFit:
         carry = _camera_jacobian(self.rows)
         spread, off = self.frame.compute_covariance(self.rows), carry @ self.off
         covariance = carry @ spread @ carry.T + np.outer(off, off)
-        if not np.isfinite(covariance).all():
+        variances = np.concatenate([np.diag(spread), np.diag(covariance)])
+        if not (np.isfinite(covariance).all() and (variances > 0).all()):
             raise np.linalg.LinAlgError("the lines do not determine the camera")
         return LoneFrameUncertainty(
             covariance,

@@ -12,7 +12,7 @@ from app.geometry.resection import ARC, SEGMENT, CurvePoints, Curves, IntArray
 from app.geometry.resection_kernels import select_farthest_points
 from app.soccer.annotation import Lines
 from app.soccer.frames import ImageSize
-from app.soccer.pitch import MARKINGS, Arc, Pitch, Segment
+from app.soccer.pitch import MARKINGS, Arc, Pitch, Segment, mirrored_marking
 
 SHARED_SHARE = 0.5
 """Of the variance of clicks, what the points of a marking have in common: 727 real frames show 0.49 to 0.63
@@ -53,6 +53,13 @@ class Observations:
         keep = self.marking == MARKINGS.index(marking)
         label = MARKINGS.index(as_marking or marking)
         return Observations(self.curves, self.pixels[keep], np.full(int(keep.sum()), label))
+
+    def mirrored(self) -> Observations:
+        """The same under the names that they have once left and right are exchanged."""
+        other = np.array([MARKINGS.index(mirrored_marking(name)) for name in MARKINGS])
+        marking = other[self.marking]
+        order = np.argsort(marking, kind="stable")
+        return Observations(self.curves, self.pixels[order], marking[order])
 
     def thin_points(self, straight: int, circular: int) -> Observations:
         """At most so many points of each straight marking and of each circle.

@@ -447,9 +447,15 @@ def has_few_measurements(observations: Observations) -> bool:
 
 
 def count_measurements(observations: Observations) -> int:
-    """Independent numbers that the observations give: two a line, at most five a circle."""
+    """Independent numbers that the observations give: two a line, at most five a circle, two a place.
+
+    Points in one pixel are one place.
+    """
+    # Clicks lie on whole and half pixels: no cell of the grid ends there.
+    cells = np.round(observations.pixels + 0.25)
+    places = np.unique(cells, axis=0, return_inverse=True)[1].ravel()
     total = 0
     for index in np.unique(observations.marking):
-        points = int((observations.marking == index).sum())
+        points = len(np.unique(places[observations.marking == index]))
         total += min(points, 5 if observations.curves.kinds[index] == ARC else 2)
-    return total
+    return min(total, 2 * len(np.unique(places)))

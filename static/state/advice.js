@@ -27,7 +27,7 @@ const TITLES = /** @type {Record<string, string>} */ ({
 	implausible_camera: 'The camera of @ is in an impossible place',
 	several_balls: 'View @ has several balls',
 	upstream_changed: 'The imported file has changed',
-	pitch_size: 'The pitch of this match has another size',
+	pitch_size: 'The pitch has another size',
 	track_disagrees: 'The ball of @ contradicts its track',
 });
 

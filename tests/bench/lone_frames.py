@@ -14,7 +14,7 @@ from app.geometry.camera import Camera
 from app.soccer.pitch import LENGTH_RANGE, WIDTH_RANGE, Pitch
 from app.soccer.policy import PAPER, CalibrationPolicy
 from app.soccer.solution import Calibration
-from app.solving.calibrate import add_lone_frame_covariance, analyse_lone_frame, calibrate
+from app.solving.calibrate import add_lone_frame_uncertainty, analyse_lone_frame, calibrate
 from tests.bench.cases import SIZE, Case, _aimed, _clicks, _deformed, _place, _shows_enough
 from tests.bench.table import print_table
 from tests.bench.truth import INSIDE_95
@@ -75,7 +75,7 @@ def lone_frames(kind: str, policy: CalibrationPolicy, count: int = FRAMES) -> li
         lines = _clicks(rng, _deformed(camera, case), case)
         calibration = calibrate(lines, Pitch(), SIZE, policy)
         alone = analyse_lone_frame(calibration, lines, Pitch(), SIZE, policy)
-        calibration = add_lone_frame_covariance(calibration, alone)
+        calibration = add_lone_frame_uncertainty(calibration, alone, Pitch())
         if calibration.camera is not None:
             found.append(Lone(calibration, _deformed(camera, case)))
     return found

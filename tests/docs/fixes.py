@@ -76,7 +76,10 @@ FINDINGS: dict[str, tuple[tuple[str, ...], str]] = {
     "implausible_camera": ((), "correct the lines: `PATCH /views/{id}/lines`"),
     "several_balls": (("pick_ball",), ""),
     "upstream_changed": ((), "keep it, or send what the files say: `PATCH /views/{id}/...`"),
-    "pitch_size": ((), "`PATCH /datasets/{id}/pitches` with the size that is proposed"),
+    "pitch_size": (
+        (),
+        "`PATCH /datasets/{id}/pitches` with the size that is proposed; of a frame alone, name its match",
+    ),
     "track_disagrees": (
         ("move_ball", "exclude_view"),
         "`offers` has its other balls too; then recompute the track: `POST /datasets/{id}/tracks`",

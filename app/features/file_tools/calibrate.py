@@ -43,11 +43,8 @@ from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import CLICKED, CalibrationPolicy
 from app.soccer.solution import Calibration
-from app.solving.calibrate import add_lone_frame_covariance, analyse_lone_frame, calibrate
-from app.solving.calibration_findings import (
-    find_calibration_findings,
-    find_pitch_findings_of_lone_frame,
-)
+from app.solving.calibrate import add_lone_frame_uncertainty, analyse_lone_frame, calibrate
+from app.solving.calibration_findings import find_calibration_findings
 from app.solving.lone_frame import LoneFrameUncertainty
 from app.solving.match_position import (
     FrameCameraPlace,
@@ -256,21 +253,16 @@ def _make_frame(
     lone: LoneFrameUncertainty | None = None,
 ) -> CalibratedFrame:
     camera = calibration.camera
-    findings = [
-        *find_calibration_findings(calibration, size),
-        *find_pitch_findings_of_lone_frame(lone, Pitch()),
-    ]
+    known = add_lone_frame_uncertainty(calibration, lone, Pitch())
     # What is drawn travels no further: it is most of a calibration.
     alone = replace(calibration, markings=())
     return CalibratedFrame(
         stem=stem,
         camera=None
         if camera is None
-        else format_camera_file(
-            camera, add_lone_frame_covariance(calibration, lone).known_covariance_with_pitch, size
-        ),
+        else format_camera_file(camera, known.known_covariance_with_pitch, size),
         reason=calibration.reason,
-        findings=tuple(findings),
+        findings=tuple(find_calibration_findings(known, size)),
         left_out=left_out,
         milliseconds=milliseconds,
         alone=alone,
@@ -286,7 +278,7 @@ def _map_frame_to_given_picture(
     camera = frame.alone.camera
     if picture is None or camera is None:
         return frame
-    known = add_lone_frame_covariance(frame.alone, frame.lone).known_covariance_with_pitch
+    known = add_lone_frame_uncertainty(frame.alone, frame.lone, Pitch()).known_covariance_with_pitch
     return replace(
         frame,
         camera=format_camera_file(picture.camera_of_annotated_picture(camera, size), known, size),

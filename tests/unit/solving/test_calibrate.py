@@ -9,10 +9,11 @@ from app.features.solutions.codec import from_json, solution_json_text, to_json
 from app.soccer.annotation import make_lines
 from app.soccer.frames import ImageSize
 from app.soccer.group import Station, View
-from app.soccer.pitch import GOAL_PARTS, Pitch
+from app.soccer.pitch import GOAL_PARTS, Pitch, mirrored_marking
 from app.soccer.policy import CLICKED, POLICIES, CalibrationPolicy
 from app.soccer.solution import Calibration
 from app.solving.calibrate import calibrate, calibrate_station, compute_calibration_key
+from app.solving.calibration_findings import find_calibration_findings
 from app.solving.facts import collect_facts_of_views
 from app.solving.jaccard import camera_jaccard, project_markings
 from app.solving.judgement import compute_view_jac
@@ -63,6 +64,19 @@ class TestCalibrate:
         assert found.camera is None
         assert found.reason == ("1 marking gives 5 independent measurements, a camera needs 7")
 
+    @pytest.mark.parametrize("spread_px", [0.0, 1e-6])
+    def test_points_at_one_place_give_no_camera_however_many_lines_they_are_said_of(
+        self, spread_px
+    ):
+        rng = np.random.default_rng(1)
+        lines = {
+            name: rng.normal((480.0, 270.0), spread_px, (len(points), 2))
+            for name, points in click(MAIN).items()
+        }
+        found = calibrate(make_lines(lines), PITCH, SIZE, POLICY)
+        assert found.camera is None
+        assert f"{len(lines)} markings give 2 independent measurements" in found.reason
+
     def test_parallel_lines_leave_the_camera_open_and_that_is_said(self):
         # Four lines along y, each clicked in its middle: nothing says how far away y is.
         names = ("Big rect. right main", "Small rect. right main", "Side line right", "Middle line")
@@ -110,6 +124,29 @@ class TestWrongLabels:
         lines = relabel(click(MAIN), "Circle right", "Circle left")
         trusting = replace(POLICY, check_labels=False)
         assert calibrate(lines, PITCH, SIZE, trusting).suspects == ()
+
+
+class TestMirrored:
+    @pytest.mark.parametrize("camera", [MAIN, BEHIND_GOAL], ids=["main", "behind goal"])
+    def test_exchanged_sides_are_the_only_finding(self, camera):
+        lines = {mirrored_marking(name): points for name, points in click(camera, 1.0).items()}
+        found = calibrate(make_lines(lines), PITCH, SIZE, POLICY)
+        (finding,) = find_calibration_findings(found, SIZE)
+        assert finding.kind == "implausible_camera" and finding.number < finding.threshold
+        assert "mirrored" in finding.sentence
+
+    @pytest.mark.parametrize("camera", [MAIN, BEHIND_GOAL], ids=["main", "behind goal"])
+    def test_lines_as_they_are_seen_are_not_mirrored(self, camera):
+        assert calibrate(click(camera, 1.0), PITCH, SIZE, POLICY).mirrored_px is None
+
+    def test_lines_at_random_are_not_mirrored_but_implausible(self):
+        rng = np.random.default_rng(3)
+        lines = {
+            name: rng.uniform((0, 0), (959, 539), (len(points), 2))
+            for name, points in click(MAIN).items()
+        }
+        found = calibrate(make_lines(lines), PITCH, SIZE, POLICY)
+        assert found.mirrored_px is None
 
 
 class TestCalibrateStation:

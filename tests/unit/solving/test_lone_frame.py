@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from app.features.solutions.codec import from_json, to_json
 from app.geometry.arrays import FloatArray
 from app.geometry.camera import Camera
 from app.soccer.annotation import Lines
@@ -16,16 +17,18 @@ from app.soccer.paint_evidence import PAINT_DISAGREES, PaintEvidence, PaintReadi
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER, STRICT, TOUCHLINE, CalibrationPolicy
+from app.soccer.solution import Calibration
 from app.solving.calibrate import (
-    add_lone_frame_covariance,
+    add_lone_frame_uncertainty,
     analyse_lone_frame,
     calibrate,
     calibrate_view,
     compute_paint_search_key,
     compute_view_calibration_keys,
 )
-from app.solving.calibration_findings import find_pitch_findings_of_lone_frame
+from app.solving.calibration_findings import find_calibration_findings
 from app.solving.lone_frame import PRIORS, LoneFrameUncertainty
+from app.solving.solve import solve_group
 from tests.cameras import SIZE, looking
 from tests.unit.solving.conftest import BEHIND_GOAL, MAIN, PITCH, click
 
@@ -62,15 +65,15 @@ class TestLoneFrame:
 
     def test_lines_that_tell_the_pitch_are_heard(self) -> None:
         _, _, lone = alone(click(WIDE, 1.0, 3, Pitch(100.0, 66.0)))
-        found = lone.clearly_different_pitch(PITCH)
+        found = lone.find_other_pitch(PITCH)
         assert found is not None
-        assert (found.length, found.width) == pytest.approx((100.0, 66.0), abs=1.0)
+        assert found.size == pytest.approx((100.0, 66.0), abs=1.0)
         assert (lone.sizes_sigma < 1.0).all()
 
     def test_on_the_pitch_in_use_no_other_is_told(self) -> None:
         for seed in range(5):
             _, _, lone = alone(click(WIDE, 1.0, seed))
-            assert lone.clearly_different_pitch(PITCH) is None
+            assert lone.find_other_pitch(PITCH) is None
             assert (np.abs([lone.pitch.length - 105, lone.pitch.width - 68]) < 1.5).all()
 
     def test_an_end_alone_leaves_the_length_open(self) -> None:
@@ -104,22 +107,25 @@ class TestLoneFrame:
         assert lone is not None
         assert set(lone.explains) == {suspect.marking for suspect in found.suspects}
         assert lone.pitch.length == pytest.approx(95.0, abs=1.0)
-        (finding,) = find_pitch_findings_of_lone_frame(lone, PITCH)
-        assert finding.kind == "pitch_size"
+        known = add_lone_frame_uncertainty(found, lone, PITCH)
+        (finding,) = (
+            item for item in find_calibration_findings(known, SIZE) if item.kind == "pitch_size"
+        )
         assert f"{lone.explains[0]}" in finding.sentence
 
     def test_where_both_are_known_nothing_is_added(self) -> None:
         lines = click(WIDE, 1.0)
         found = calibrate(lines, PITCH, SIZE, PAPER.calibration)
         assert analyse_lone_frame(found, lines, PITCH, SIZE, PAPER.calibration) is None
-        assert add_lone_frame_covariance(found, None) is found
+        assert add_lone_frame_uncertainty(found, None, PITCH) is found
         assert PAPER.calibration.lone_frames == STRICT.calibration.lone_frames == "exact"
 
     def test_the_camera_itself_stays(self) -> None:
         lines = click(WIDE, 1.0, 3, Pitch(98.0, 64.0))
         found = calibrate(lines, PITCH, SIZE, ANY)
-        told = add_lone_frame_covariance(found, analyse_lone_frame(found, lines, PITCH, SIZE, ANY))
-        assert told == replace(found, covariance=told.covariance)
+        lone = analyse_lone_frame(found, lines, PITCH, SIZE, ANY)
+        told = add_lone_frame_uncertainty(found, lone, PITCH)
+        assert told == replace(found, covariance=told.covariance, other_pitch=told.other_pitch)
         assert told.covariance != found.covariance
 
 
@@ -141,6 +147,17 @@ class TestOfDataset:
         key, clicks = compute_view_calibration_keys(group, group.views[0], TOUCHLINE.calibration)
         exact = replace(TOUCHLINE.calibration, lone_frames="exact")
         assert compute_view_calibration_keys(group, group.views[0], exact) == (clicks,) != (key,)
+
+    def test_another_pitch_is_a_finding_of_its_view_and_is_kept_with_the_calibration(self) -> None:
+        lines = click(WIDE, 1.0, 3, Pitch(98.0, 64.0))
+        view = View("a", Station("a", SIZE, lines=lines), ())
+        solution = solve_group(self.group(view), TOUCHLINE)
+        (finding,) = (item for item in solution.findings if item.kind == "pitch_size")
+        assert finding.view == "a" and finding.number > finding.threshold
+        kept = from_json(Calibration, to_json(solution.views[0].calibration))
+        assert kept == solution.views[0].calibration and kept.other_pitch is not None
+        of_match = solve_group(self.group(view, match="m"), TOUCHLINE)
+        assert "pitch_size" not in {item.kind for item in of_match.findings}
 
     @pytest.mark.parametrize("reason", ["no_paint", "no_frame", PAINT_DISAGREES])
     def test_is_alone_also_where_its_paint_says_nothing(self, reason: str, monkeypatch) -> None:
