@@ -29,6 +29,7 @@ from app.paint.grass import explain_missing_field, find_field_of_play
 from app.paint.ranking import (
     MOST_UNCERTAIN_M,
     VISIBLE_PX,
+    WELL_PAINTED,
     WINDOWS,
     WORK_WIDTH,
     FrameToSearch,
@@ -49,7 +50,7 @@ from app.soccer.pitch import Pitch
 from app.soccer.policy import CalibrationPolicy
 from app.solving.observations import principal_point
 
-SEARCH_VERSION = 4
+SEARCH_VERSION = 5
 """Of the search and what decides: where nothing was proposed, a later one looks again."""
 ENLARGED_WIDTH, ENLARGED = 640, 2
 """Narrower pictures are read so many times as large: their paint is hardly a pixel broad."""
@@ -60,7 +61,7 @@ SHAPES = (1.29, 2.45)
 BORDER_PX = 4
 """At the border of a picture ridges are no paint."""
 MOST_PIECES = 8
-WELL_SUPPORTED, WELL_PAINTED = 0.75, 0.75
+WELL_SUPPORTED = 0.75
 """Where less of the markings has paint, each that would be seen has to have it nearly whole."""
 LEAST_SUPPORTED, LEAST_SCORE, LEAST_LEAD, LEAST_SUM = 0.50, 0.30, 0.06, 0.52
 """The less of the paint a camera explains, the farther all others have to lie behind it."""

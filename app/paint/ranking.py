@@ -67,7 +67,8 @@ MARKING_PLACES = 12
 """Places (``evidence.SPACING_PX`` apart) from which on the paint of a marking would be seen."""
 
 
-LEAST_WEAKEST = 0.25
+LEAST_WEAKEST, WELL_PAINTED = 0.25, 0.75
+"""A marking with a lower share of its paint contradicts a camera, or shows it not drawn to the end."""
 
 
 NEAR_KNOWN_M, NEAR_KNOWN_SIGMAS, KEPT_AT_KNOWN = 4.0, 3.0, 0.97
@@ -166,7 +167,24 @@ def rank_cameras(
     ]
     if known is not None:
         ranked = [move_to_known_position(frame, item, library, pitch) for item in ranked]
-    return merge_ranked_cameras(frame, [], ranked)
+    ranked = merge_ranked_cameras(frame, [], ranked)
+    again = _snap_patchy_again(frame, ranked[0], pitch) if ranked else []
+    return merge_ranked_cameras(frame, again, ranked)
+
+
+def _snap_patchy_again(
+    frame: FrameToSearch, item: RankedCamera, pitch: Pitch
+) -> list[RankedCamera]:
+    """A camera that lost the paint of a marking on the way to the others, drawn from afar once more;
+    nothing where that shows no more of it."""
+    if item.weakest >= WELL_PAINTED or item.known is not None:
+        return []
+    start = item.snapped.camera
+    snapped = snap_with_known_position(frame.reading, start, pitch, WINDOWS, item.policy)
+    if snapped.reason is not None:
+        return []
+    again = _rank_snapped(frame, snapped, pitch, item.policy, None)
+    return [again] if again.weakest > item.weakest else []
 
 
 def _rank_snapped(

@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from app.config import Settings
 from app.features.file_tools.paint import measure_paint_agreement_of_files, snap_cameras_to_paint
 from app.media.files import decode_frame
+from app.paint.propose import propose_camera
 from app.paint.view_proposal import propose_lines_in_image
 from app.soccer.frames import ImageSize
 from app.soccer.group import Media
@@ -51,3 +53,13 @@ def test_accepted_proposals_qualify_with_the_goals_that_are_seen():
             assert made.jac is not None and made.jac[0] > PAPER.min_jac, path.name
             counted += 1
     assert counted >= 19
+
+
+def test_a_marking_that_lost_its_paint_on_the_way_is_drawn_onto_it_once_more():
+    """Mirrored, the same picture showed that edge of the penalty area on its paint at once."""
+    image = decode_frame(Media(str(DATA / "stills" / "wc10_a.png")), False, Settings())
+    found = [propose_camera(picture) for picture in (image, np.ascontiguousarray(image[:, ::-1]))]
+    assert [one.outcome for one in found] == ["proposed", "proposed"]
+    assert min(one.weakest for one in found) > 0.7
+    here, there = (one.camera.position for one in found)
+    assert np.hypot(*(here - there * [-1, 1, 1])[1:]) < 0.5
