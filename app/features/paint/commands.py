@@ -187,7 +187,10 @@ def propose(
     undo: Annotated[
         bool, typer.Option("--undo", help="With --dataset: forget all that was proposed.")
     ] = False,
-    workers: Workers = None,
+    workers: Annotated[
+        int | None,
+        typer.Option("--workers", min=1, help="With --dataset: processes; default: all cores."),
+    ] = None,
     json_: Json = False,
 ) -> None:
     """Propose a camera for each picture from its painted lines alone.
