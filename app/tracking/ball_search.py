@@ -25,6 +25,8 @@ _SAME_S = 1e-4
 """Instants that are closer are one."""
 _ASIDE_M, _ABOVE_M, _BELOW_M = 12.0, 45.0, 0.0
 """How far from the pitch a ball is looked for."""
+_START_S, _MOST_WRONG = 1.0, 3
+"""How long a run tells whether its first rays are of the ball, and of how many instants they may not be."""
 
 
 @dataclass(frozen=True)
@@ -169,24 +171,52 @@ def find_likeliest_history(
 ) -> BallHistory:
     """The likeliest history of a stretch.
 
+    Where nothing is known of the ball yet, every history takes the first ray. So the start is searched without its
+    first rays, too, and they are left out where that is likelier.
+
     Args:
         knots: Of the stretch.
         pitch: Where the ball is played.
         width: Histories that are kept.
         shortest_s: Between two knots, below which the ball is not taken to be touched.
     """
+    history = _search(knots, pitch, width, shortest_s)
+    seen = np.unique(knots.at)[:_MOST_WRONG]
+    if not len(seen):
+        return history
+    end = int(np.searchsorted(knots.times, knots.times[seen[-1]] + _START_S))
+    if history.used[: knots.starts[end]].all():
+        return history
+    first = np.flatnonzero(knots.at == seen[0])
+    tried = [*first[:, None], *(np.flatnonzero(knots.at <= last) for last in seen)]
+    best, score = knots, _search(knots, pitch, width, shortest_s, end).score
+    for rays in tried:
+        noise = knots.noise.copy()
+        noise[rays] = np.inf
+        without = replace(knots, noise=noise)
+        found = _search(without, pitch, width, shortest_s, end).score
+        if found > score:
+            best, score = without, found
+    return history if best is knots else _search(best, pitch, width, shortest_s)
+
+
+def _search(
+    knots: TrackKnots, pitch: Pitch, width: int, shortest_s: float, end: int | None = None
+) -> BallHistory:
+    """The likeliest history up to a knot; rays of infinite noise are of something else."""
     x, y = pitch.length / 2 + _ASIDE_M, pitch.width / 2 + _ASIDE_M
     room = np.array([[-x, x], [-y, y], [-_ABOVE_M, _BELOW_M]])
-    asked = knots.asked
+    asked, times = knots.asked, knots.times[:end]
     mode, event, left, state, score = find_likeliest_modes(
-        knots.times, knots.starts, knots.centres, knots.across, knots.along,
+        times, knots.starts, knots.centres, knots.across, knots.along,
         knots.noise, knots.scale, knots.far, knots.far_sigma, room, width, shortest_s,
         find_view_changes(knots), asked.wanted, asked.begin, asked.due, asked.may_not,
         np.searchsorted(asked.at, np.arange(len(knots.times) + 1)),
         asked.normal, asked.value, asked.sigma,
     )  # fmt: skip
-    bit = np.arange(len(knots.at)) - knots.starts[knots.at]
-    return BallHistory(mode, event, state, (left[knots.at] >> bit) & 1 == 0, float(score))
+    at = knots.at[: knots.starts[len(times)]]
+    bit = np.arange(len(at)) - knots.starts[at]
+    return BallHistory(mode, event, state, (left[at] >> bit) & 1 == 0, float(score))
 
 
 def find_view_changes(knots: TrackKnots) -> BoolArray:

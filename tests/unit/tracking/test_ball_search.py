@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.geometry.camera import Camera
 from app.soccer.pitch import Pitch
 from app.tracking.ball_models import BOUNCE, FLIGHT, KICK, ROLL
 from app.tracking.ball_search import (
@@ -87,6 +88,21 @@ class TestSearch:
         knots = build_knots(replace(given, pixels=pixels), TIMES, np.zeros(2))
         history = find_likeliest_history(knots, Pitch())
         assert knots.rows[~history.used].tolist() == [70]
+
+    @pytest.mark.parametrize(
+        ("views", "wrong"),
+        [(BOTH, [0]), (BOTH, [len(TIMES)]), ({"right": RIGHT}, [0]), ({"right": RIGHT}, [0, 1])],
+    )
+    def test_wrong_balls_of_the_first_instants_are_not_used(
+        self, views: dict[str, Camera], wrong: list[int]
+    ) -> None:
+        given = seen(views)
+        pixels = given.pixels.copy()
+        pixels[wrong] += (-300.0, 150.0)
+        pixels[wrong[1:]] += 200.0
+        knots = build_knots(replace(given, pixels=pixels), TIMES, np.zeros(len(views)))
+        history = find_likeliest_history(knots, Pitch())
+        assert knots.rows[~history.used].tolist() == wrong
 
     def test_one_view_finds_a_flight_between_kick_and_bounce(self) -> None:
         history = find_likeliest_history(

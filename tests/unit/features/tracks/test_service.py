@@ -222,11 +222,12 @@ class TestWarnings:
 
 
 def mirrored(group: Group) -> Group:
-    """A group with the ball of one view where a mirrored camera would have it."""
-    view = group.views[0]
-    point = view.ball.point
-    ball = replace(view.ball, point=ImagePoint(view.size.width - 1 - point.x, point.y))
-    return group.with_view(replace(view, balls=(ball,)))
+    """A group with the balls of two of four views where mirrored cameras would have them."""
+    for view in group.views[:2]:
+        point = view.ball.point
+        ball = replace(view.ball, point=ImagePoint(view.size.width - 1 - point.x, point.y))
+        group = group.with_view(replace(view, balls=(ball,)))
+    return group
 
 
 def _events(store: Store) -> list[tuple[int, str]]:
