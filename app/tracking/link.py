@@ -12,8 +12,15 @@ from dataclasses import replace
 import numpy as np
 
 from app.geometry.arrays import FloatArray, IntArray
-from app.tracking.ball_rays import BallRays
-from app.tracking.link_fit import FEWEST_PAIRS, LinearTimeMap, LinkFitter, estimate_frame_interval_s
+from app.tracking.ball_rays import LONGEST_GAP_S, BallRays
+from app.tracking.link_fit import (
+    FASTEST,
+    FEWEST_PAIRS,
+    SLOWEST,
+    LinearTimeMap,
+    LinkFitter,
+    estimate_frame_interval_s,
+)
 from app.tracking.link_reasons import judge_map
 from app.tracking.time_map import TimeMap, fit_map_to_instants
 
@@ -55,12 +62,28 @@ def fit_time_map(
         if len(rays) < FEWEST_PAIRS:
             reason = f"The {name} has {len(rays)} rays to the ball; a link needs {FEWEST_PAIRS}."
             return TimeMap(reason)
+        step = estimate_frame_interval_s(rays)
+        if step > (LONGEST_GAP_S if rays is live else LONGEST_GAP_S / SLOWEST):
+            reason = (
+                f"The frames of the {name} that show the ball are {step:.3g} s apart; a link needs them within "
+                f"{LONGEST_GAP_S:g} s of live time. Times are in seconds."
+            )
+            return TimeMap(reason)
     fit = LinkFitter(live, replay, hints)
+    if fit.is_too_long():
+        reason = (
+            f"The live shot of {np.ptp(live.times):.0f} s and the replay of {np.ptp(replay.times):.0f} s are too long "
+            "to be linked: give one shot of each, or an instant that both show."
+        )
+        return TimeMap(reason)
     tried = [fit.refine_map(one) for one in fit.find_candidate_maps()]
     found = [one for one in tried if one is not None]
     if not found:
         where = " near the instants given" if len(hints) else ""
-        reason = f"The rays of the live shot and the replay do not meet long enough{where}."
+        reason = (
+            f"The rays of the live shot and the replay do not meet long enough{where}, at no speed from {SLOWEST:g} "
+            f"to {FASTEST:g}."
+        )
         return TimeMap(reason)
     best = max(found, key=fit.map_log_likelihood)
     made = judge_map(fit, best, found)

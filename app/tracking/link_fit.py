@@ -13,7 +13,7 @@ from app.tracking.ball_rays import LONGEST_GAP_S, BallRays, BoolArray, estimate_
 from app.tracking.link_kernels import score_ray_meetings
 from app.tracking.time_map import TimeMap
 
-SLOWEST, FASTEST = 0.2, 1.15
+SLOWEST, FASTEST = 0.1, 1.15
 """Speeds of replays that are looked for."""
 FEWEST_PAIRS, LEAST_OVERLAP_S = 20, 0.8
 """Rays of the replay with a live one beside them, and live time between the first and the last."""
@@ -38,6 +38,10 @@ _BEND = 25.0
 _CANDIDATES = 8
 APART_S = 0.25
 """Maps whose times nowhere differ by more are one candidate."""
+_KEPT_OF_SPEED = _CANDIDATES * (2 * round(APART_S / _COARSE_S) + 1)
+"""Maps of one speed that can be among the candidates: each of these stands for its neighbours."""
+_MOST_MAPS = 1e8
+"""Maps that are tried at most: minutes of one processor."""
 _FLOORS_M = (0.3, 0.3, 0.2, 0.15, 0.1, 0.07, 0.05, 0.03, *(0.0,) * 12)
 """What misses may have beside their noise, step by step of a refinement."""
 _BLOCK_S = 0.4
@@ -148,11 +152,22 @@ class LinkFitter:
         """Misses by those that the noise of the rays leaves."""
         self.run = 1.0
         """Neighbours that say the same, beyond those that share a ray."""
+        self.sigma = (0.0, 0.0)
+        """Of the live time in the middle of the last map's rays, seconds, and of its speed."""
 
     def max_time_difference(self, a: LinearTimeMap, b: LinearTimeMap) -> float:
         """Most seconds between the live times that two maps give the replay."""
         ends = self.replay.times[[0, -1]]
         return float(np.abs(a.to_live_times(ends) - b.to_live_times(ends)).max())
+
+    def is_too_long(self) -> bool:
+        """Whether there are more maps than can be tried."""
+        of_speed = (self.live.times[-1] - self.live.times[0] + self.span / 2) / _COARSE_S
+        return not len(self.hints) and of_speed * FASTEST / self._speed_step() > _MOST_MAPS
+
+    def _speed_step(self) -> float:
+        shown = float(self.live.times[-1] - self.live.times[0]) / SLOWEST
+        return 0.1 / max(min(self.span, 2 * shown), 1.0)
 
     def find_candidate_maps(self) -> list[LinearTimeMap]:
         """Maps under which most rays meet, best first: every offset with every speed."""
@@ -165,20 +180,22 @@ class LinkFitter:
         seen = np.hstack([positions, directions])
         rays = np.hstack([replay.positions[some], replay.directions[some]])
         sigma_live = float(np.median(live.sigma))
-        step = 0.1 / max(min(self.span, 2 * (end - begin) / SLOWEST), 1.0)
+        step = self._speed_step()
         scores, maps = [np.zeros(0)], [np.zeros((0, 2))]
         for speed in np.arange(SLOWEST, FASTEST, step):
             shifts = speed * (replay.times[some] - self.middle) / _GRID_S
             first = int(np.floor((LEAST_OVERLAP_S - speed * self.span / 2) / _GRID_S))
             centres = np.arange(first, len(grid) - first, round(_COARSE_S / _GRID_S))
             centres = centres[self._is_near_hints(begin + _GRID_S * centres, float(speed))]
-            scores.append(
-                score_ray_meetings(
-                    centres, shifts, seen, known, sigma_live, rays, replay.sigma[some], _ROOM,
-                    _SEARCH_M**2, _BACKGROUND_M, float(np.exp(_WRONG)),
-                )
+            score = score_ray_meetings(
+                centres, shifts, seen, known, sigma_live, rays, replay.sigma[some], _ROOM,
+                _SEARCH_M**2, _BACKGROUND_M, float(np.exp(_WRONG)),
             )  # fmt: skip
-            maps.append(np.column_stack([begin + _GRID_S * centres, np.full(len(centres), speed)]))
+            best = np.sort(np.argsort(-score, kind="stable")[:_KEPT_OF_SPEED])
+            scores.append(score[best])
+            maps.append(
+                np.column_stack([begin + _GRID_S * centres[best], np.full(len(best), speed)])
+            )
         score, table = np.concatenate(scores), np.vstack(maps)
         chosen: list[LinearTimeMap] = []
         for row in np.argsort(-score, kind="stable"):
@@ -368,6 +385,10 @@ class LinkFitter:
         self.run = max(1.0, (run * blocks + _PRIOR_BLOCKS) / (blocks + _PRIOR_BLOCKS))
         turn = np.array([[1.0, -self.middle], [0.0, 1.0]])
         rays = self.replay.times[pairs.replay]
+        # The offset may lie so far from the rays that its covariance tells nothing of them.
+        middle = np.array([1.0, float(np.median(rays)) - self.middle])
+        variances = self.run * middle @ known @ middle, self.run * known[1, 1]
+        self.sigma = float(np.sqrt(variances[0])), float(np.sqrt(variances[1]))
         return TimeMap(
             None,
             one.offset,

@@ -40,7 +40,7 @@ def judge_map(fit: LinkFitter, best: LinearTimeMap, found: Sequence[LinearTimeMa
     pairs = fit.find_ray_pairs(best)
     made = fit.to_time_map(best, pairs)
     reason = _explain_mismatch(fit, made, pairs) or _explain_ambiguity(fit, best, found, pairs)
-    return replace(made, reason=reason or _explain_uncertainty(fit, made, pairs))
+    return replace(made, reason=reason or _explain_uncertainty(made, fit.sigma))
 
 
 def _explain_mismatch(fit: LinkFitter, made: TimeMap, pairs: RayPairs) -> str | None:
@@ -97,11 +97,10 @@ def _explain_ambiguity(
     return None
 
 
-def _explain_uncertainty(fit: LinkFitter, made: TimeMap, pairs: RayPairs) -> str | None:
+def _explain_uncertainty(made: TimeMap, sigma: tuple[float, float]) -> str | None:
     """Why a map is too uncertain to be used; None where it is not."""
-    assert made.covariance is not None and made.speed is not None
-    middle = np.array([1.0, float(np.median(fit.replay.times[pairs.replay]))])
-    time, speed = np.sqrt(middle @ made.covariance @ middle), np.sqrt(made.covariance[1, 1])
+    assert made.speed is not None
+    time, speed = sigma
     if time <= _USEFUL_S and speed <= _USEFUL_SHARE * made.speed:
         return None
     return (

@@ -38,6 +38,8 @@ BALL_FILE = "ball.csv"
 _COLUMNS = ("frame", "time_s", "x", "y")
 _MOST_RAYS = 20_000
 """Of a view: beyond, it is a match and no shot."""
+_MOST_NUMBER = 1e15
+"""In a cell; times may count from 1970."""
 _HINT = re.compile(r"\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*=\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*")
 
 
@@ -179,6 +181,8 @@ def _read_ball_rays(folder: Path, report: ReaderReport) -> BallRays:
     if not cameras:
         raise report.make_refusal_error(f"{folder} contains no camera_<frame>.json")
     rows = read_ball_rows(folder / BALL_FILE, str(folder / BALL_FILE), report)
+    if not rows:
+        raise report.make_refusal_error(f"{folder / BALL_FILE} has no row with a ball")
     seen = [(time, pixel, cameras[frame]) for frame, time, pixel in rows if frame in cameras]
     if not seen:
         raise InputError(
@@ -252,7 +256,7 @@ def _parse_number(row: Mapping[str, str], column: str, name: str, line: int) -> 
         value = float(text or "")
     except ValueError:
         value = float("nan")
-    if not np.isfinite(value) or abs(value) > 1e9:
+    if not np.isfinite(value) or abs(value) > _MOST_NUMBER:
         raise DatasetFormatError(
             name, f"line {line}", column, f'is "{text}", which is not a number'
         )

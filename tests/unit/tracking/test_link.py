@@ -50,7 +50,7 @@ def two_speeds(first: float, second: float, seed: int = 0) -> tuple[BallRays, Ba
 
 
 class TestPlanted:
-    @pytest.mark.parametrize("speed", [1.08, 1.0, 0.5, 0.25])
+    @pytest.mark.parametrize("speed", [1.08, 1.0, 0.5, 0.25, 0.125])
     def test_offset_and_speed_are_found(self, speed: float) -> None:
         for seed in (1, 2):
             planted = plant(BALL, seed, speed=speed, noise_px=0.5, stand=OPPOSITE)
@@ -87,6 +87,16 @@ class TestPlanted:
 
 
 class TestUnobservable:
+    def test_recordings_of_an_hour_are_too_long(self) -> None:
+        planted = plant(BALL, 1, stand=OPPOSITE)
+        views = []
+        for view in (planted.live, planted.replay):
+            rays = view.rays()
+            hour = np.concatenate([rays.times + 60.0 * minute for minute in range(60)])
+            views.append(replace(rays.part(np.arange(len(hour)) % len(rays)), times=hour))
+        made = find_time_map(*views)
+        assert made.reason is not None and "too long to be linked" in made.reason
+
     def test_a_ball_at_rest(self) -> None:
         for seed in range(3):
             planted = plant(ball_of(10.0, 5.0, -0.11), seed, whole=seed == 2)

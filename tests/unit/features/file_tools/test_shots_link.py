@@ -4,6 +4,7 @@ import json
 import os
 import stat
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -68,6 +69,27 @@ class TestLinkFiles:
         assert any("2 of" in one and "have no camera" in one for one in problems)
         assert out.is_dir()
 
+    def test_times_may_count_from_1970(self, tmp_path: Path) -> None:
+        folders = [
+            write_view(tmp_path / name, replace(view, times=view.times + 1764588000.0))
+            for name, view in (("live", PLANTED.live), ("replay", PLANTED.replay))
+        ]
+        result = link_live_and_replay(*folders, tmp_path / "out")
+        assert result["outcome"] == "linked" and result["problems"] == []
+        assert result["speed"] == pytest.approx(PLANTED.speed, rel=0.01)
+
+    def test_times_in_milliseconds_are_refused_at_once(self, tmp_path: Path) -> None:
+        folders = [
+            write_view(tmp_path / name, replace(view, times=view.times * 1000.0))
+            for name, view in (("live", PLANTED.live), ("replay", PLANTED.replay))
+        ]
+        result = link_live_and_replay(*folders, tmp_path / "out")
+        assert result["outcome"] == "unobservable"
+        assert result["reason"] == (
+            "The frames of the live shot that show the ball are 40 s apart; a link needs them within 0.2 s of live "
+            "time. Times are in seconds."
+        )
+
     def test_two_frames_of_one_time(self, views: tuple[Path, Path, Path]) -> None:
         path = views[0] / "ball.csv"
         lines = path.read_text().splitlines()
@@ -83,6 +105,14 @@ class TestLinkFiles:
         [
             (lambda live: (live / "ball.csv").unlink(), "frame,time_s,x,y"),
             (lambda live: (live / "ball.csv").write_text("frame,x,y\n1,2,3\n"), "time_s"),
+            (
+                lambda live: (live / "ball.csv").write_text("frame,time_s,x,y\n"),
+                "has no row with a ball",
+            ),
+            (
+                lambda live: (live / "ball.csv").write_text("frame,time_s,x,y\n7,1e40,2,3\n"),
+                'is "1e40", which is not a number',
+            ),
             (
                 lambda live: [one.unlink() for one in live.glob("camera_*")],
                 "contains no camera files",
