@@ -220,13 +220,26 @@ def _search(
 
 
 def find_view_changes(knots: TrackKnots) -> BoolArray:
-    """Whether other views see the ball at a knot than at the last one before it that any does, (K,)."""
+    """Whether a view comes to see the ball at a knot, or went at the last one before it that any sees, (K,).
+
+    Views whose frames lie between those of others see it all the while.
+    """
     result = np.zeros(len(knots.times), dtype=bool)
-    before: set[int] = set()
-    for knot in np.unique(knots.at).tolist():
-        views = set(knots.view[knots.starts[knot] : knots.starts[knot + 1]].tolist())
-        result[knot] = bool(before) and views != before
-        before = views
+    seen = np.unique(knots.at)
+    first, last = knots.times[seen[[0, -1]]] if len(seen) else (0.0, 0.0)
+    for view in np.unique(knots.view):
+        own = np.searchsorted(seen, np.unique(knots.at[knots.view == view]))
+        times = knots.times[seen[own]]
+        step = float(np.median(np.diff(times))) if len(own) > 1 else 0.0
+        gone = np.flatnonzero(np.diff(times) > 1.5 * step)
+        went, came = own[gone] + 1, own[gone + 1]
+        away = went != came
+        went, came = went[away], came[away]
+        if times[0] - first > 0.99 * step:
+            came = np.append(came, own[0])
+        if last - times[-1] > 0.99 * step:
+            went = np.append(went, own[-1] + 1)
+        result[seen[np.concatenate([went, came])]] = True
     return result
 
 

@@ -21,10 +21,14 @@ from app.tracking.ball_track import BallMeasurements, BallTrack, ViewErrors
 
 _ODD = 0.4
 """Share of one view's rays beyond which it is of something else."""
-_SHIFTS = 4
-"""Times that views are looked at for times that are off."""
+_SHIFTS = 6
+"""Times that a track is made at most while views are found to be off in time."""
 _LATE_S, _LATE_SIGMA_S, _LATE_SURE, _LATE_LEAST_S = 0.1, 0.01, 5.0, 0.003
 """How late views may be; how well that has to be known; in how many sigmas, and from where on it counts."""
+_DOUBT = 10.0
+"""Times its noise that a ray may be off while views that contradict each other are looked at for their times."""
+_LATE_SETTLED_S = 0.0005
+"""Of a change of a view's offset, that needs no other look."""
 
 
 def track_ball(
@@ -53,20 +57,32 @@ def track_ball(
     """
     options = options or TrackOptions()
     frames, times = np.asarray(frames), np.asarray(times, dtype=float)
+
+    def solve_runs(shift: FloatArray, doubt: float = 1.0) -> list[TrackRun]:
+        return [
+            solve_run(measurements, rows, times, shift, pitch, options, said, known, doubt)
+            for rows in split_into_runs(measurements.times, options.longest_gap_s)
+        ]
+
     reason = (
         explain_too_few_measurements(measurements) if len(frames) else "The stretch has no frames."
     )
     if reason is None:
         shift = (known or ViewErrors()).time_shifts(measurements.view_names)
-        for _ in range(_SHIFTS):
-            runs = [
-                solve_run(measurements, rows, times, shift, pitch, options, said, known)
-                for rows in split_into_runs(measurements.times, options.longest_gap_s)
-            ]
-            if known is not None or not (moved := _estimate_time_offsets(measurements, runs)).any():
+        for turn in range(_SHIFTS):
+            runs = solve_runs(shift)
+            odd = None if known is not None else _explain_inconsistent_view(measurements, runs)
+            if known is not None or turn == _SHIFTS - 1:
                 break
-            shift += moved
-        odd = None if known is not None else _explain_inconsistent_view(measurements, runs)
+            if odd is not None or all(run.fitted is None for run in runs):
+                # Rays of a late view look like those of something else.
+                runs_in_doubt = solve_runs(shift, _DOUBT)
+                found = _estimate_time_offsets(measurements, runs_in_doubt, shift)
+            else:
+                found = _estimate_time_offsets(measurements, runs, shift)
+            if np.abs(found - shift).max() < _LATE_SETTLED_S:
+                break
+            shift = found
         reason = next((run.reason for run in runs if run.reason), None)
         if odd is not None:
             reason = odd
@@ -98,10 +114,17 @@ def _explain_inconsistent_view(measurements: BallMeasurements, runs: list[TrackR
     )
 
 
-def _estimate_time_offsets(measurements: BallMeasurements, runs: list[TrackRun]) -> FloatArray:
+def _estimate_time_offsets(
+    measurements: BallMeasurements, runs: list[TrackRun], shift: FloatArray
+) -> FloatArray:
     """Seconds to add to each view's times, nought but where the ball says it surely, shape (V,).
 
-    The times of most of them are those that count.
+    The times on which views with the most measurements agree are those that count.
+
+    Args:
+        measurements: Of the stretch.
+        runs: As they were solved with a shift.
+        shift: That one, by ``measurements.view_names``.
     """
     names = measurements.view_names
     count = len(names)
@@ -113,20 +136,16 @@ def _estimate_time_offsets(measurements: BallMeasurements, runs: list[TrackRun])
         known[np.ix_(own, own)] += run.fitted.late
         pull[own] += run.fitted.late_pull
         rays[own] += np.bincount(run.knots.view, minlength=len(own))
-    found = np.zeros(count)
     free = np.delete(np.arange(count), rays.argmax())
-    if not len(free):
-        return found
-    told = known[np.ix_(free, free)] + np.eye(len(free)) / _LATE_S**2
-    spread = np.linalg.inv(told)
-    late = -spread @ pull[free]
-    sigma = np.sqrt(spread.diagonal())
-    sure = (sigma < _LATE_SIGMA_S) & (np.abs(late) > np.maximum(_LATE_SURE * sigma, _LATE_LEAST_S))
-    found[free[sure]] = np.clip(late[sure], -_LATE_S, _LATE_S)
-    if count < 3:
-        return found
-    # Where most views agree on an offset, it is the others that are off.
-    order = found.argsort()
-    middle = order[np.searchsorted(rays[order].cumsum(), rays.sum() / 2)]
-    result: FloatArray = found - found[middle]
+    spread, found = np.zeros((count, count)), shift.copy()
+    if len(free):
+        told = known[np.ix_(free, free)] + np.eye(len(free)) / _LATE_S**2
+        spread[np.ix_(free, free)] = np.linalg.inv(told)
+        found -= spread @ pull
+    agree = np.abs(found[:, None] - found) < _LATE_LEAST_S
+    right = (agree @ rays).argmax()
+    variance = spread.diagonal() + spread[right, right] - 2 * spread[right]
+    sigma, found = np.sqrt(np.maximum(variance, 0.0)), found - found[right]
+    sure = (sigma < _LATE_SIGMA_S) & (np.abs(found) > np.maximum(_LATE_SURE * sigma, _LATE_LEAST_S))
+    result: FloatArray = np.where(sure, np.clip(found, -_LATE_S, _LATE_S), 0.0)
     return result

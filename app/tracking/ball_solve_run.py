@@ -115,6 +115,7 @@ def solve_run(
     options: TrackOptions,
     said: TrackConstraints | None = None,
     known: ViewErrors | None = None,
+    doubt: float = 1.0,
 ) -> TrackRun:
     """Search and fit a run.
 
@@ -127,6 +128,7 @@ def solve_run(
         options: As of the track.
         said: What is said beside the measurements.
         known: Of a part of a track: what the whole says of the views. It was judged as a whole.
+        doubt: Times that the noise of all views is taken.
     """
     part = measurements.part(rows)
     names = list(measurements.view_names)
@@ -137,6 +139,7 @@ def solve_run(
     knots = build_knots(part, times[(times >= first) & (times <= last)], own, said)
     if known is None:
         knots = inflate_ray_noise(knots, _INEXACT)
+        knots = replace(knots, noise=knots.noise * doubt)
     else:
         knots = replace(knots, noise=knots.noise * known.noise_factors(part.view_names)[knots.view])
     if len(np.unique(knots.at)) < FEWEST:

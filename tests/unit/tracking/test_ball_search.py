@@ -50,6 +50,14 @@ class TestChangedViews:
         changed = find_view_changes(build_knots(given, TIMES, np.zeros(2)))
         assert np.flatnonzero(changed).tolist() == [40, 60]
 
+    def test_views_between_the_frames_of_others_do_not_come_and_go(self) -> None:
+        given = seen(BOTH, hide=[("left", 40, 60)])
+        late = np.array([view == "right" for view in given.views])
+        times = given.times + np.where(late, 0.013, 0.0)
+        knots = build_knots(replace(given, times=times), np.zeros(0), np.zeros(2))
+        changed = knots.times[find_view_changes(knots)]
+        assert changed == pytest.approx([TIMES[39] + 0.013, TIMES[60]])
+
 
 class TestLouder:
     """Cameras that are not exact: rays of one ball that pass each other."""

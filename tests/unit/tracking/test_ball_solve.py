@@ -222,6 +222,27 @@ class TestOffsets:
         assert track.offsets[0][1] == pytest.approx(-late, abs=0.003)
         assert np.median(np.linalg.norm(track.position - PLACES, axis=1)) < 0.03
 
+    @pytest.mark.parametrize(
+        "late", [{"a": 0.03}, {"b": -0.03}, {"a": 0.02, "b": 0.06}, {"left": 0.04, "a": -0.03}]
+    )
+    def test_views_that_most_others_contradict_are_the_late_ones(
+        self, late: dict[str, float]
+    ) -> None:
+        more = {
+            name: looking((x, y, -14.0), (0.0, 0.0, 0.0), 1600.0)
+            for name, x, y in (("a", 40.0, 50.0), ("b", -40.0, -55.0), ("c", 35.0, -60.0))
+        }
+        given = seen({**BOTH, **more})
+        off = np.array([late.get(name, 0.0) for name in given.views])
+        track = tracked(replace(given, times=given.times + off))
+        assert track.reason is None
+        found = dict(track.offsets)
+        assert found == pytest.approx({name: -one for name, one in late.items()}, abs=0.0015)
+        off = track.position - PLACES
+        inverse = np.linalg.inv(track.covariance[:, :3, :3])
+        inside = np.einsum("ni,nij,nj->n", off, inverse, off) < INSIDE_95
+        assert inside.mean() > 0.88
+
     def test_views_in_time_are_left_alone(self, track: BallTrack) -> None:
         assert track.offsets == ()
 
