@@ -282,7 +282,7 @@ def _serve_tasks(pipe: Connection, limits: WorkerLimits) -> None:
     for name in _ONE_THREAD:
         os.environ[name] = "1"
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    _set_resource_limit(resource.RLIMIT_DATA, limits.memory)
+    set_resource_limit(resource.RLIMIT_DATA, limits.memory)
     with suppress(OSError):
         # Where memory runs out all the same, the kernel takes this process first.
         Path("/proc/self/oom_score_adj").write_text("1000")
@@ -296,13 +296,14 @@ def _serve_tasks(pipe: Connection, limits: WorkerLimits) -> None:
         while True:
             work, arguments, sends = pipe.recv()
             usage = resource.getrusage(resource.RUSAGE_SELF)
-            _set_resource_limit(
+            set_resource_limit(
                 resource.RLIMIT_CPU, usage.ru_utime + usage.ru_stime + limits.processor
             )
             pipe.send(_run_work(work, (*arguments, send_message) if sends else arguments))
 
 
-def _set_resource_limit(kind: int, amount: float) -> None:
+def set_resource_limit(kind: int, amount: float) -> None:
+    """Set a soft limit (``resource.RLIMIT_...``) of this process, within its hard one; infinite: none."""
     if math.isinf(amount):
         return
     hard = resource.getrlimit(kind)[1]

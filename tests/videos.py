@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
@@ -104,6 +105,17 @@ def stretch_pixels(path: Path, over: int, under: int) -> Path:
     described = data[start + 24 : end] + _box(b"pasp", struct.pack(">II", over, under))
     descriptions = _box(b"stsd", data[start + 8 : start + 16] + _box(kind, described))
     path.write_bytes(_replaced(data, _DESCRIPTIONS, descriptions))
+    return path
+
+
+def mark_interlaced(path: Path, since: int = 0) -> Path:
+    """Let an MPEG-2 video say that its frames hold two fields, from the picture on that is coded as that number."""
+    data = bytearray(path.read_bytes())
+    for one in re.finditer(rb"\x00\x00\x01\xb5[\x10-\x1f]", data):
+        data[one.end()] &= 0xF7
+    for one in [*re.finditer(rb"\x00\x00\x01\xb5[\x80-\x8f]", data)][since:]:
+        data[one.end() + 3] &= 0x7F
+    path.write_bytes(data)
     return path
 
 

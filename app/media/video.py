@@ -7,6 +7,10 @@ from __future__ import annotations
 
 import hashlib
 import os
+import resource
+import shlex
+import subprocess
+import sys
 from collections import OrderedDict
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing, contextmanager, suppress
@@ -20,7 +24,8 @@ import numpy.typing as npt
 
 from app.config import Settings
 from app.durable import replace_file
-from app.errors import ImageError, TooLargeError
+from app.errors import ImageError, OverloadedError, TooLargeError
+from app.worker_process import set_resource_limit
 
 _CONTAINERS = "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts,mpeg,asf,flv,ogg"
 """By FFmpeg's names. Those that are left out include playlists (concat, hls): their files could
@@ -47,6 +52,91 @@ def open_video(path: Path, options: Sequence[int] = ()) -> Iterator[cv2.VideoCap
         yield video
     finally:
         video.release()
+
+
+_PROBED, _PROBE_SECONDS, _PROBE_BYTES = 50, 45, 1024 * 2**20
+"""Frames that a probe decodes, and what it may use at most."""
+_PROBE = (
+    "import sys; from app.media.video import decode_some_frames; decode_some_frames(*sys.argv[1:])"
+)
+_TWO_FIELDS = b"Cannot convert interlaced"
+
+
+def require_progressive_start(path: Path) -> None:
+    """``require_progressive`` where the first two pictures of a video are the same one.
+
+    Raises:
+        ImageError, OverloadedError: As it does; ``ImageError`` too where it is not a video that can be read.
+    """
+    with _open_video(path) as video:
+        first = [_retrieve_frame(video) for _ in range(2) if video.grab()]
+    if len(first) == 2 and np.array_equal(*first):
+        require_progressive(path)
+
+
+def require_progressive(path: Path, start: float = 0.0) -> None:
+    """Raise where OpenCV cannot convert the pictures of a video, as they are interlaced: it then returns the picture
+    before once more, and only FFmpeg's log says so. A process of its own writes that log.
+
+    Args:
+        path: The video.
+        start: Where to look at it, milliseconds.
+
+    Raises:
+        ImageError: They are.
+        OverloadedError: The process did not end in time.
+    """
+    more = {"OPENCV_FFMPEG_LOGLEVEL": "16", "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-c", _PROBE, str(path), str(start)]
+    try:
+        log = subprocess.run(
+            command,
+            env=os.environ | more,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            timeout=_PROBE_SECONDS,
+            check=False,
+        ).stdout
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise OverloadedError(
+            f"the frames of {path.name} could not be checked", hint="Try again in a moment."
+        ) from error
+    if _TWO_FIELDS in log:
+        raise ImageError(
+            f"{path.name} is interlaced (two fields a frame), and its pictures cannot be read",
+            hint="Make it progressive, then import the result:"
+            f" ffmpeg -i {shlex.quote(path.name)} -vf bwdif {_describe_conversion(path)}",
+        )
+
+
+def decode_some_frames(path: str, start: str) -> None:
+    """The work of that process, which has limits and inherits those of its parent."""
+    set_resource_limit(resource.RLIMIT_CPU, _PROBE_SECONDS)
+    set_resource_limit(resource.RLIMIT_DATA, _PROBE_BYTES)
+    with open_video(Path(path)) as video:
+        if float(start) > 0:
+            video.set(cv2.CAP_PROP_POS_MSEC, float(start))
+        for _ in range(_PROBED):
+            if video.grab():
+                video.retrieve()
+
+
+def _describe_conversion(path: Path) -> str:
+    """How FFmpeg is told to write a video that every decoder reads."""
+    return f"-c:v libx264 -crf 16 {shlex.quote(f'{path.stem}-converted.mp4')}"
+
+
+def make_undecodable_error(path: Path, video: cv2.VideoCapture) -> ImageError:
+    """What is said of an open video of which no frame can be decoded."""
+    four = (int(video.get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF).to_bytes(4, "little")
+    codec = four.decode("ascii", "replace").strip("\0 ").upper()
+    known = f" (codec {'AV1' if codec == 'AV01' else codec})" if codec.isalnum() else ""
+    return ImageError(
+        f"{path.name} has no frame that can be decoded{known}",
+        hint="Convert it, then import the result:"
+        f" ffmpeg -i {shlex.quote(path.name)} {_describe_conversion(path)}",
+    )
 
 
 MOST_DAMAGED = 500
@@ -304,6 +394,7 @@ def _retrieve_frame(video: Any) -> Any:
 
 def _decode_times(path: Path, tell: Callable[[int], None] | None) -> Times:
     times: list[float] = []
+    require_progressive_start(path)
     with _open_video(path) as video:
         while grab_next_frame_counting_damaged(video) is not None:
             times.append(video.get(cv2.CAP_PROP_POS_MSEC))
@@ -311,6 +402,8 @@ def _decode_times(path: Path, tell: Callable[[int], None] | None) -> Times:
                 raise TooLargeError(f"{path.name} has more than {MAX_FRAMES:,} frames")
             if tell is not None and len(times) % _A_WORD == 0:
                 tell(len(times))
+        if not times:
+            raise make_undecodable_error(path, video)
     return np.array(times)
 
 

@@ -17,7 +17,15 @@ from app.config import Settings
 from app.errors import ImageError, TooLargeError
 from app.geometry.arrays import FloatArray, IntArray
 from app.media.images import ImageHeader, check_size
-from app.media.video import MAX_FRAMES, FrameReader, grab_next_frame_counting_damaged, open_video
+from app.media.video import (
+    MAX_FRAMES,
+    FrameReader,
+    grab_next_frame_counting_damaged,
+    make_undecodable_error,
+    open_video,
+    require_progressive,
+    require_progressive_start,
+)
 from app.video.index import RecordingFacts, RecordingIndex, find_time_base
 from app.video.measures import (
     COMB_EVERY,
@@ -37,6 +45,9 @@ _BEFORE_END = 20
 """Frames between the end of a file and a jump into it."""
 _LEAST_MOVING = 5
 """Frames that move, of those that are looked at for combs."""
+_MOST_STILL = 0.2
+"""Share of frames without any change from the one before, beyond which they may be interlaced ones that cannot
+be read."""
 _MOVING = 3.0
 """Mean change from the frame before, grey levels, of a frame that moves."""
 
@@ -87,6 +98,7 @@ def _build_index(
         coded = _read_coded_size(video)
         if settings is not None:
             check_size(ImageHeader("video", *coded), settings, path.name)
+        require_progressive_start(path)
         rotation = int(video.get(cv2.CAP_PROP_ORIENTATION_META)) % 360
         aspect = read_pixel_aspect(video, rotation)
         measurer = FrameMeasurer(video.get(cv2.CAP_PROP_FPS))
@@ -108,8 +120,11 @@ def _build_index(
                 raise TooLargeError(f"{path.name} has more than {MAX_FRAMES:,} frames")
             if tell is not None and len(times) % _A_WORD == 0:
                 tell(len(times), max(total, len(times)) if total > 0 else None)
-    if not times:
-        raise ImageError(f"{path.name} has no frame that can be decoded")
+        if not times:
+            raise make_undecodable_error(path, video)
+    still = np.flatnonzero(rows.get_measured_rows()["change"][1:] == 0)
+    if settings is not None and len(still) > _MOST_STILL * len(times):
+        require_progressive(path, times[still[len(still) // 2]])
     shown = _repair_last_time(np.array(times))
     _require_consistent_seek(path, shown)
     base, pts = find_time_base(shown)

@@ -15,7 +15,7 @@ from app.media import video as video_index
 from app.media.files import decode_frame, has_video_index, read_encoded_frame, read_video_times
 from app.media.frames import FrameProvider, find_neighbouring_frames
 from app.soccer.group import Media
-from tests.videos import delay_start, number_of, vary_times, write_video
+from tests.videos import delay_start, mark_interlaced, number_of, vary_times, write_video
 
 TICK = 512
 COUNT = 200
@@ -275,6 +275,19 @@ class TestFramesOfTheServer:
                 assert waiting is not None
                 with pytest.raises(ImageError, match="not a video that can be read"):
                     waiting.future.result(60)
+        finally:
+            frames.close()
+
+    def test_one_whose_interlaced_pictures_cannot_be_read_is_refused(
+        self, tmp_path: Path, settings: Settings
+    ) -> None:
+        path = mark_interlaced(write_video(tmp_path / "cam1.ts", "MPG2", 60))
+        media, frames = Media(str(path), frame=0), FrameProvider(settings)
+        try:
+            waiting = frames.request_frame_preparation(media)
+            assert waiting is not None
+            with pytest.raises(ImageError, match=r"^cam1\.ts is interlaced"):
+                waiting.future.result(60)
         finally:
             frames.close()
 

@@ -16,6 +16,7 @@ from app.video.measures import hash_distance
 from tests.videos import (
     HEIGHT,
     WIDTH,
+    mark_interlaced,
     number_of,
     numbered,
     stretch_pixels,
@@ -86,6 +87,24 @@ class TestIndexRecording:
         path = turn(stretch_pixels(write_video(tmp_path / "cam1.mp4", "mp4v", 5), 4, 3), 270)
         facts = index_recording(path, settings).facts
         assert (facts.width, facts.height) == (HEIGHT, 213)
+
+    @pytest.mark.parametrize("since", [0, 150])
+    def test_one_whose_interlaced_pictures_cannot_be_read_is_refused(
+        self, since: int, tmp_path: Path, settings: Settings
+    ) -> None:
+        path = mark_interlaced(write_video(tmp_path / "cam 1.avi", "MPG2", 240), since)
+        with pytest.raises(ImageError, match=r"^cam 1\.avi is interlaced \(two fields") as caught:
+            index_recording(path, settings)
+        assert caught.value.hint is not None
+        assert "ffmpeg -i 'cam 1.avi' -vf bwdif -c:v" in caught.value.hint
+
+    def test_one_that_cannot_be_decoded_names_its_codec(
+        self, tmp_path: Path, settings: Settings
+    ) -> None:
+        path = write_video(tmp_path / "cam1.avi", "XVID", 5)
+        path.write_bytes(path.read_bytes().replace(b"XVID", b"AV01"))
+        with pytest.raises(ImageError, match=r"^cam1\.avi has no frame .* \(codec AV1\)$"):
+            index_recording(path, settings)
 
     @pytest.mark.parametrize("fields", [True, False])
     def test_two_fields_in_a_frame_are_seen(
