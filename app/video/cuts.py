@@ -2,17 +2,19 @@
 
 A frame behind a cut is no moved picture of the frame before (``residual``) and has other colours
 (``histogram``). Both at once, and in no frame beside it, is a cut; fast motion and whip pans last
-longer, and after a flash the picture is what it was.
+longer, and after a flash the picture is what it was. Where a frame or two of a foreign picture lie
+between two shots, both its ends are cuts.
 """
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
-from app.video.measures import Measured
+from app.video.measures import Measured, convert_lags_to_frames
 
 LEAST_CHANGE, LEAST_RESIDUAL = 0.12, 0.45
 """Of a cut: product of residual and histogram, and residual alone."""
@@ -24,6 +26,8 @@ FLASH_SECONDS = 0.28
 """Longest flash."""
 MOST_RETURN = 0.6
 """Share of a change that is left once a flash is over."""
+LEAST_FADING = 0.1
+"""Share of that change by which a flash fades from frame to frame at its end."""
 
 
 def combine_change_measures(rows: Measured) -> FloatArray:
@@ -60,7 +64,28 @@ def find_hard_cuts(rows: Measured, step: float) -> tuple[IntArray, BoolArray]:
         beside[number - near.start] = 0.0
         if beside.max() < MOST_BESIDE * change[number]:
             found.append(number)
-    return np.array(found, np.int64), flashed
+    for first, last in pairwise(candidates.tolist()):
+        if last - first <= BESIDE and _has_foreign_frames(rows, change, first, last, step):
+            found += [first, last]
+    return np.unique(np.array(found, np.int64)), flashed
+
+
+def _has_foreign_frames(
+    rows: Measured, change: FloatArray, first: int, last: int, step: float
+) -> bool:
+    """Whether two changes are the ends of a foreign picture between two shots, which show nothing of each other."""
+    before = first - 1
+    lags = convert_lags_to_frames(1 / step)
+    at, lag = next((at, lag) for at, lag in enumerate(lags) if before + lag >= last)
+    after = before + lag
+    if after >= len(rows) or rows["cells"][[before, last]].mean(axis=(1, 2, 3)).min() < DARK:
+        return False
+    beside = change[max(first - BESIDE, 0) : after + 1].copy()
+    beside[[first - after - 1, last - after - 1]] = 0.0
+    if beside.max() >= MOST_BESIDE * change[[first, last]].min():
+        return False
+    apart = float(rows["apart"][after, at])
+    return apart > LEAST_RESIDUAL and apart * rows["recoloured"][after, at] > LEAST_CHANGE
 
 
 def _mean_cell_difference(cells: Any, one: Any, others: Any) -> FloatArray:
@@ -74,7 +99,10 @@ def _find_flash_end(cells: Any, number: int, reach: int) -> int | None:
     after = np.arange(number, min(number + reach + 1, len(cells)))
     away = _mean_cell_difference(cells, number - 1, after)
     back = np.flatnonzero(away < MOST_RETURN * away[0])
-    return int(after[back[0]]) if len(back) else None
+    if not len(back):
+        return None
+    fading = away[back[0] : -1] - away[back[0] + 1 :] > LEAST_FADING * away[0]
+    return int(after[back[0]] + np.argmin([*fading, False]))
 
 
 def _has_flash_ended(cells: Any, number: int, reach: int) -> bool:

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -9,6 +10,7 @@ from app.config import Settings
 from app.video.cuts import find_hard_cuts
 from app.video.index import RecordingIndex
 from app.video.indexing import index_recording
+from app.video.transitions import find_soft_transitions
 from tests.films import Clip, Join, flash, freeze, join, rendered, slow, whip, write_film
 from tests.videos import vary_times
 
@@ -49,6 +51,37 @@ class TestHardCuts:
         cuts, lit = find_hard_cuts(index.measured, index.step)
         assert cuts.tolist() == []
         assert np.flatnonzero(lit).tolist() == list(range(30, 30 + frames))
+
+    def test_a_flash_that_fades_is_no_cut_and_no_transition(
+        self, tmp_path: Path, settings: Settings
+    ) -> None:
+        film = flash(rendered(3, 60), 30, 1)
+        film[31] = cv2.addWeighted(film[31], 0.5, np.full_like(film[31], 255), 0.5, 0)
+        index = indexed(tmp_path, film, settings)
+        cuts, lit = find_hard_cuts(index.measured, index.step)
+        assert cuts.tolist() == [] and np.flatnonzero(lit).tolist() == [30, 31]
+        assert find_soft_transitions(index.measured, index.step, cuts, lit) == []
+
+    @pytest.mark.parametrize("foreign", ["one", "two", "white", "black"])
+    def test_foreign_frames_between_two_shots_are_no_reason_to_miss_the_cut(
+        self, foreign: str, tmp_path: Path, settings: Settings
+    ) -> None:
+        between = {
+            "one": rendered(7, 1),
+            "two": rendered(7, 2),
+            "white": [np.full((180, 320, 3), 255, np.uint8)],
+            "black": [np.zeros((180, 320, 3), np.uint8)],
+        }[foreign]
+        film = rendered(1, 40) + between + rendered(2, 40)
+        assert cuts_of(indexed(tmp_path, film, settings)) == [40, 40 + len(between)]
+
+    @pytest.mark.parametrize("frames", [1, 2])
+    def test_foreign_frames_amid_a_shot_are_no_cut(
+        self, frames: int, tmp_path: Path, settings: Settings
+    ) -> None:
+        shot = rendered(1, 60)
+        film = shot[:30] + rendered(7, frames) + shot[30:]
+        assert cuts_of(indexed(tmp_path, film, settings)) == []
 
     @pytest.mark.parametrize("speed", [0.1, 0.2, 0.35])
     def test_a_whip_pan_is_no_cut(self, speed: float, tmp_path: Path, settings: Settings) -> None:
