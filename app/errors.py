@@ -278,7 +278,7 @@ class TooManyTriesError(AccessError):
 
 
 class JobCancelled(Exception):  # noqa: N818
-    """The job shall end here: a person cancelled it, or the server stops."""
+    """The job shall end here: a person cancelled it, the server stops, or what the job is about is gone, which its text says."""
 
 
 class ShapeError(ValueError):

@@ -168,10 +168,10 @@ class JobRun:
                 "result": result,
                 **({} if sentence is None else {"sentence": sentence}),
             }
-        except JobCancelled:
-            if not self.progress.cancelled.is_set():
+        except JobCancelled as error:
+            if not error.args and not self.progress.cancelled.is_set():
                 return None
-            return {"state": CANCELLED, "sentence": "Cancelled."}
+            return {"state": CANCELLED, "sentence": str(error) or "Cancelled."}
         except FailedWithReportError as error:
             return {**_failure_columns(error.message, error.hint), "result": error.result}
         except ReviewError as error:

@@ -12,7 +12,14 @@ from typing import Any, TypeVar
 from app.config import Settings
 from app.db.store import Store
 from app.durable import replace_file
-from app.errors import ConflictError, ImageError, InputError, NotFoundError, StorageError
+from app.errors import (
+    ConflictError,
+    ImageError,
+    InputError,
+    NotFoundError,
+    StorageError,
+    TooLargeError,
+)
 from app.features.audit.service import add_audit_event
 from app.features.recordings.queries import delete_links, update_recording
 from app.features.recordings.service import (
@@ -70,9 +77,17 @@ def index_recording_in_worker(
     stamp = compute_file_stamp(path)
     if stamp is None:
         raise NotFoundError(f"{path.name} is no longer in the place that it was imported from")
-    facts, shots = run_in_worker(
-        path, index_recording_file, store.settings, progress=progress, stop=stop
-    )
+    try:
+        facts, shots = run_in_worker(
+            path, index_recording_file, store.settings, progress=progress, stop=stop
+        )
+    except (ImageError, TooLargeError) as error:
+        if row.sha256 is None:
+            problem = f"{error.message}. {error.hint}" if error.hint else error.message
+            with store.write() as session:
+                text = canonical_json_text({"problem": problem})
+                update_recording(session, recording_id, facts=text)
+        raise
     if compute_file_stamp(path) != stamp:
         raise ImageError(f"{path.name} changed while it was read", hint="Import it again.")
     with store.write() as session:

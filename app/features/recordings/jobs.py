@@ -12,7 +12,7 @@ from app.config import Settings
 from app.db.database_worker import SILENCE, run_in_worker
 from app.db.json_columns import Json
 from app.db.store import Store
-from app.errors import TooLargeError
+from app.errors import JobCancelled, NotFoundError, TooLargeError
 from app.features.imports.upload_queries import (
     find_complete_upload_path,
     get_upload,
@@ -103,13 +103,30 @@ def request_index(
 
 
 def run_index_job(store: Store, progress: JobProgress) -> Json:
-    """The work itself; its result is what was found."""
+    """The work itself; its result is what was found.
+
+    Raises:
+        JobCancelled: The recording was removed meanwhile.
+    """
+    try:
+        return _index_recording(store, progress)
+    except NotFoundError as error:
+        try:
+            get_recording(store, progress.job.request["recording"])
+        except NotFoundError:
+            raise JobCancelled("The recording was removed.") from error
+        raise
+
+
+def _index_recording(store: Store, progress: JobProgress) -> Json:
     recording_id = progress.job.request["recording"]
     recording = get_recording(store, recording_id)
     name = recording.name
     progress(0, None, f"Reading {name}.")
 
     def report_frames_read(done: int, total: int | None = None, sentence: str = "") -> None:
+        # Whoever removes it needs no index of it.
+        get_recording(store, recording_id)
         progress(done, total, sentence or f"{plural(done, 'frame')} of {name} read.")
 
     actor = progress.job.actor

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from app.config import Settings
-from app.db.json_columns import parse_json_column
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError, InputError, NotFoundError
@@ -38,7 +37,7 @@ from app.features.recordings.queries import (
     list_link_rows,
     update_link,
 )
-from app.features.recordings.service import require_recording
+from app.features.recordings.service import build_recording_from_row, require_recording
 from app.geometry.arrays import FloatArray
 from app.json_text import canonical_json_text
 from app.tracking.time_map import fit_map_to_instants
@@ -153,12 +152,10 @@ def _require_shot(
     session: Session, recording: int, first: int, last: int, pointer: str
 ) -> RecordingRow:
     row = require_recording(session, recording)
-    if row.facts is None:
-        raise ConflictError(
-            f'the recording "{row.name}" is not indexed yet',
-            hint="Wait for the job that indexes it.",
-        )
-    frames = parse_json_column(row.facts)["frames"]
+    recording = build_recording_from_row(row)
+    if recording.frames is None:
+        recording.require_readable()
+    frames = recording.frames or 0
     if not first <= last < frames:
         raise InputError(
             f'"{row.name}" has {plural(frames, "frame")}, so it has no shot from frame {first}'

@@ -51,7 +51,9 @@ class RecordingDocument(Document):
     )
     shots: int = Field(description="How many shots it has.")
     groups: int = Field(description="How many groups were taken from it.")
-    problem: str | None = Field(description="Why its frames cannot be read now.")
+    problem: str | None = Field(
+        description="Why its frames cannot be read now, or could not be indexed."
+    )
     clocks: list[MatchClockReading] = Field(
         description="What the clock of the match shows in frames of it, by frame."
     )

@@ -58,7 +58,7 @@ class Recording:
         damaged: How many pictures of the file cannot be decoded; they are left out, and have no number.
         shots: How many it has.
         groups: How many groups were taken from it.
-        problem: Why its frames cannot be read now, in a sentence; None: they can.
+        problem: Why its frames cannot be read now, or why it could not be indexed, in a sentence or two; None: neither.
         clocks: What the clock of the match shows in frames of it.
     """
 
@@ -195,7 +195,7 @@ def set_clock_readings(
     with store.write() as session:
         row = require_recording(session, recording_id)
         found = validate_clock_readings(
-            clocks, parse_json_column(row.facts)["frames"] if row.facts else 0
+            clocks, parse_json_column(row.facts)["frames"] if row.facts and row.sha256 else 0
         )
         text = clock_readings_to_column(found)
         if text != row.clocks:
@@ -266,12 +266,14 @@ def build_recording_from_row(row: RecordingRow) -> Recording:
         dataset=row.dataset,
         name=row.name,
         path=path,
-        indexed=row.facts is not None,
+        indexed=row.sha256 is not None,
         sha256=row.sha256,
         **{name: facts.get(name) for name in (*names, *shape)},
         shots=len(parse_json_column(row.shots)),
         groups=int(row.groups),
-        problem=None if row.stamp is None else _describe_file_problem(path, row.stamp),
+        problem=facts.get("problem")
+        if row.stamp is None
+        else _describe_file_problem(path, row.stamp),
         actor=row.actor,
         created=row.created,
         clocks=clock_readings_from_column(row.clocks),

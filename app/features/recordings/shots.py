@@ -124,7 +124,7 @@ def replace_shots(
         row = require_recording(session, recording_id)
         if if_match is not None:
             require_etag(_make_shots_etag(row), if_match, f'the list of shots of "{row.name}"')
-        frames = parse_json_column(row.facts)["frames"] if row.facts else 0
+        frames = parse_json_column(row.facts)["frames"] if row.facts and row.sha256 else 0
         _validate_shots(shots, frames)
         text = canonical_json_text([asdict(shot) for shot in shots])
         if text != row.shots:

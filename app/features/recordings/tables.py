@@ -13,7 +13,8 @@ class RecordingModel(Base):
     """A recording, its shots (JSON), and what was found when it was indexed last.
 
     The file stays where it is, at ``path``; ``stamp`` is its size and time of change when it was
-    indexed. ``facts`` (JSON) and ``sha256`` are null until then. ``revision`` counts the changes of
+    indexed. ``facts`` (JSON) and ``sha256`` are null until then, except for the ``problem`` in ``facts``
+    that kept it from being indexed. ``revision`` counts the changes of
     ``shots``. ``clocks`` (JSON) are readings of the clock of the match; null: nobody read it.
     """
 

@@ -155,7 +155,7 @@ function Opened({ one, reload }) {
 	const running = useRunningJobs({ dataset: one.dataset }, ({ subject }) => subject?.recording === one.id);
 	const why = one.problem ?? (one.indexed ? null : 'It is not indexed yet.');
 	if (!why) return html`<${Film} one=${one} running=${running} reload=${reload} />`;
-	return html`<section class="card empty" role="alert"><h2>The frames cannot be read now</h2><p>${why}</p>${one.problem ? html`<p>Groups taken from it still work. Put the file back, or index it again as it is now; if the file is the same, its shots stay.</p>` : null}<${FindAgain} one=${one} running=${running} label="Index the recording again" over=${reload} /></section>`;
+	return html`<section class="card empty" role="alert"><h2>The frames cannot be read now</h2><p>${why}</p>${one.problem && one.indexed ? html`<p>Groups taken from it still work. Put the file back, or index it again as it is now; if the file is the same, its shots stay.</p>` : null}<${FindAgain} one=${one} running=${running} label="Index the recording again" over=${reload} /></section>`;
 }
 
 export function RecordingPage() {

@@ -28,8 +28,8 @@ import { VideoField } from './video_uploads.js';
 /** @import {RecordingJson} from '../../api/recordings.js' */
 
 /** What is known of it, in words. @param {RecordingJson} one */
-export function factsOf({ width, height, fps, variable, interlaced, damaged, seconds, frames }) {
-	if (frames === null) return 'not indexed yet';
+export function factsOf({ width, height, fps, variable, interlaced, damaged, seconds, frames, problem }) {
+	if (frames === null) return problem ? 'not indexed' : 'not indexed yet';
 	return [
 		`${width} × ${height}`, `${Number((fps ?? 0).toFixed(3))} frames a second${variable ? ' (variable)' : ''}`,
 		lengthText(seconds ?? 0), plural(frames, 'frame'), interlaced ? 'interlaced' : '', damaged ? `${plural(damaged, 'damaged picture')} left out` : '',

@@ -15,9 +15,12 @@ import pytest
 
 import touchline
 from app.db.log import read_log
+from app.db.store import Store
 from app.features.datasets.service import get_dataset
 from app.features.imports.cameras import import_given_cameras
 from app.features.recordings import index as module
+from app.features.recordings import jobs
+from app.features.recordings.service import remove_recording
 from app.soccer.frames import ImageSize
 from app.soccer.policy import TOUCHLINE
 from tests.cameras import looking
@@ -102,7 +105,27 @@ class TestAddRecording:
         assert (job.state, problem in job.problem["detail"]) == ("failed", True)
         (listed,) = api.get(API).json()["items"]
         assert (listed["indexed"], listed["frames"]) == (False, None)
-        assert api.get(f"{API}/{listed['id']}/frames/0").status_code == 409
+        assert problem in listed["problem"]
+        refused = api.get(f"{API}/{listed['id']}/frames/0")
+        assert (refused.status_code, refused.json()["detail"]) == (409, listed["problem"])
+        write_video(film, "mp4v", FRAMES)
+        finished(api.post(f"{API}/{listed['id']}/shots"))
+        found = api.get(f"{API}/{listed['id']}").json()
+        assert (found["indexed"], found["problem"]) == (True, None)
+
+    def test_one_that_is_removed_while_it_is_read_ends_its_job(
+        self, api, film: Path, finished: Finished, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        read = jobs.index_recording_in_worker
+
+        def remove_and_read(store: Store, recording_id: int, **more: Any) -> Any:
+            remove_recording(store, recording_id, actor="ann")
+            return read(store, recording_id, **more)
+
+        monkeypatch.setattr(jobs, "index_recording_in_worker", remove_and_read)
+        body = {"dataset": "cup", "source": {"folder": "films/final.mp4"}}
+        job = finished(api.post(API, json=body))
+        assert (job.state, job.sentence) == ("cancelled", "The recording was removed.")
 
     def test_what_has_no_name_of_a_video_is_refused_at_once(self, api, film: Path) -> None:
         (film.parent / "notes.txt").write_text("x")
