@@ -152,10 +152,10 @@ def _require_shot(
     session: Session, recording: int, first: int, last: int, pointer: str
 ) -> RecordingRow:
     row = require_recording(session, recording)
-    recording = build_recording_from_row(row)
-    if recording.frames is None:
-        recording.require_readable()
-    frames = recording.frames or 0
+    found = build_recording_from_row(row)
+    if found.frames is None:
+        found.require_readable()
+    frames = found.frames or 0
     if not first <= last < frames:
         raise InputError(
             f'"{row.name}" has {plural(frames, "frame")}, so it has no shot from frame {first}'

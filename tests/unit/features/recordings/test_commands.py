@@ -24,6 +24,25 @@ class TestImportVideo:
         again = json.loads(touchline("import", "video", films[1], "--dataset", "cup", "--json")[1])
         assert again == rows[1:]
 
+    def test_a_file_that_cannot_be_read_is_named_and_the_others_follow(
+        self, tmp_path: Path, touchline: Run
+    ) -> None:
+        films = [write_video(tmp_path / f"{name}.mp4", "mp4v", 5) for name in ("one", "two")]
+        bad = tmp_path / "bad.mp4"
+        bad.write_text("no video at all")
+        words = ("import", "video", films[0], bad, films[1], "--dataset", "cup")
+        code, told, complaint = touchline(*words)
+        assert (code, told.count("sha256"), "two" in told) == (1, 2, True)
+        assert f"{bad}: bad.mp4 is not a video that can be read" in complaint
+        code, told, _ = touchline(*words, "--json")
+        one, refused, two = json.loads(told)
+        assert (code, one["name"], two["name"]) == (1, "one", "two")
+        assert refused == {
+            "file": str(bad),
+            "problem": "bad.mp4 is not a video that can be read",
+            "hint": None,
+        }
+
     def test_what_is_no_video_is_refused_before_anything_is_kept(
         self, tmp_path: Path, touchline: Run
     ) -> None:
