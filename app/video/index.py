@@ -27,6 +27,8 @@ _FINEST = 200_000
 """Ticks a second; MPEG counts 90,000, and 48,000 and 30,000 are common in MP4."""
 _NANOSECONDS = 10**9
 _MOST_TICKS = 2_000_000
+_RESTART = 1000.0
+"""Milliseconds; where times fall by more, the clock of the stream has started again."""
 _MOST_UNEVEN = 0.02
 """By how much the time between two frames may differ from the usual one at a constant rate: containers
 that count in milliseconds round."""
@@ -96,8 +98,20 @@ class RecordingIndex:
     @cached_property
     def seconds(self) -> FloatArray:
         """When each frame is shown, seconds after the first one, never falling, shape (N,)."""
-        rising = np.maximum.accumulate(self.times)
+        rising = np.maximum.accumulate(self._continued_times)
         return np.asarray((rising - rising[:1]) / 1000.0)
+
+    @cached_property
+    def _continued_times(self) -> FloatArray:
+        """``times`` of one clock: where that of the stream starts again, the next frame comes a usual step later."""
+        steps = np.diff(self.times)
+        restarted = steps < -_RESTART
+        if not restarted.any():
+            return self.times
+        usual = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+        return np.append(
+            self.times[:1], self.times[0] + np.cumsum(np.where(restarted, usual, steps))
+        )
 
     @cached_property
     def step(self) -> float:
@@ -132,7 +146,7 @@ class RecordingIndex:
     @property
     def uneven_step_mask(self) -> BoolArray:
         """Whether the time to the next frame is another one than usual, shape (N - 1,)."""
-        steps = np.diff(self.times) / 1000.0
+        steps = np.diff(self._continued_times) / 1000.0
         # A container may count in milliseconds, or coarser.
         tick = self.facts.time_base[0] / self.facts.time_base[1]
         slack = max(_MOST_UNEVEN * self.step, tick if tick < self.step / 4 else 0.0)

@@ -56,6 +56,14 @@ class TestTimeBaseOf:
 
 
 class TestRecordingIndex:
+    def test_a_clock_that_starts_again_goes_on(self, tmp_path: Path, settings: Settings) -> None:
+        path = write_video(tmp_path / "cam1.ts", "MPG2", 60)
+        path.write_bytes(2 * path.read_bytes())
+        index = index_recording(path, settings)
+        assert (len(index), index.fps, index.is_variable) == (120, 25.0, False)
+        assert index.seconds == pytest.approx(np.arange(120) / 25)
+        assert index.end == pytest.approx(120 / 25)
+
     def test_a_constant_rate_is_said_as_it_is(self, index: RecordingIndex) -> None:
         assert index.fps == 25.0 and not index.is_variable
         assert index.end == pytest.approx(1.2)
