@@ -17,7 +17,7 @@ from app.formats.frame_names import IMAGE_SUFFIXES, VIDEO_SUFFIXES, is_system_fi
 from app.formats.json_reader import read_json
 from app.formats.report import ReaderReport
 from app.formats.safe_path import read_regular_file, require_safe_path
-from app.formats.trees import open_tree_context
+from app.formats.trees import StoreTree, open_tree_context
 from app.object_store.path import (
     StoredPath,
     find_path,
@@ -31,6 +31,8 @@ from app.wording import plural
 
 _HEADS = (16 * 1024, 1024 * 1024)
 """Bytes of a picture in which its size is looked for."""
+_TAIL, _MOST = 4096, 256 * 2**20
+"""Bytes at the end of a JPEG among which its picture usually ends, and that are read of one at most."""
 IS_VIDEO = (
     "is a video: bring it in as a recording (import video, or the page Recordings), and take frames "
     "from it"
@@ -156,6 +158,9 @@ def _read_views(
         report.read += 1
         try:
             size = _read_image_size(tree, name, size_of)
+            # Of a store only the beginning is read.
+            if not isinstance(tree, StoreTree):
+                _require_whole_jpeg(tree, name)
         except DatasetFormatError as error:
             report.add_problem(error)
             continue
@@ -175,6 +180,30 @@ def _read_image_size(tree: FileTree, name: str, size_of: SizeOf) -> ImageSize:
         except BROKEN as error:
             raise DatasetFormatError(shown, None, None, "is damaged, or its zip file is") from error
     raise DatasetFormatError(shown, None, None, problem)
+
+
+def _require_whole_jpeg(tree: FileTree, name: str) -> None:
+    """Raise where a JPEG ends before its picture: decoders fill the rest with grey and do not say so."""
+    try:
+        with tree.open(name) as file:
+            data = file.read(2)
+            if data != b"\xff\xd8":
+                return
+            data += file.read(_MOST)
+    except BROKEN as error:
+        raise DatasetFormatError(
+            tree.shown(name), None, None, "is damaged, or its zip file is"
+        ) from error
+    if b"\xff\xd9" in data[-_TAIL:]:
+        return
+    # A small picture among the headers ends with the same two bytes.
+    place = 2
+    while data[place : place + 1] == b"\xff" and data[place + 1 : place + 2] != b"\xda":
+        place += 2 + max(int.from_bytes(data[place + 2 : place + 4], "big"), 2)
+    if b"\xff\xd9" not in data[place:]:
+        raise DatasetFormatError(
+            tree.shown(name), None, None, "is cut off: the end of its picture is missing"
+        )
 
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")

@@ -1,8 +1,10 @@
 from __future__ import annotations
 
 import zipfile
+from io import BytesIO
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image
 
@@ -79,6 +81,22 @@ class TestReadFrames:
         assert told["notes.txt"] == "is not a JPEG, PNG or WebP picture"
         assert told["c.jpg"] == "is damaged in its header"
         assert told["wide.png"].startswith("declares 600 x 10 pixels")
+
+    def test_a_jpeg_that_is_cut_off_is_named(self, tmp_path: Path, report: ReaderReport) -> None:
+        thumbnail, noise = BytesIO(), np.random.default_rng(1).integers(0, 255, (200, 300, 3))
+        Image.new("RGB", (16, 9)).save(thumbnail, "JPEG")
+        Image.fromarray(noise.astype(np.uint8)).save(
+            tmp_path / "whole.jpg", exif=b"Exif\0\0" + thumbnail.getvalue()
+        )
+        whole = (tmp_path / "whole.jpg").read_bytes()
+        (tmp_path / "cut.jpg").write_bytes(whole[: len(whole) // 2])
+        (tmp_path / "live.jpg").write_bytes(whole + bytes(10_000))
+        assert [group.key for group in read(tmp_path, report)] == ["live.jpg", "whole.jpg"]
+        (problem,) = report.problems
+        assert (Path(problem.path).name, problem.problem) == (
+            "cut.jpg",
+            "is cut off: the end of its picture is missing",
+        )
 
     def test_a_folder_without_pictures_says_so(self, tmp_path: Path, report: ReaderReport) -> None:
         assert read(tmp_path, report) == []
