@@ -22,7 +22,7 @@ from app.db.json_columns import Json
 from app.db.session import now
 from app.db.store import Store
 from app.durable import sync_to_disk
-from app.errors import ConflictError, InputError, NotFoundError, StorageError
+from app.errors import ConflictError, InputError, NotFoundError, StorageError, UnsafePathError
 from app.features.imports.upload_queries import (
     CONTENT,
     content_path,
@@ -109,9 +109,13 @@ def resolve_folder(settings: Settings, path: str) -> Root:
         )
     if any(len(part.encode(errors="replace")) > MAX_PART for part in path.split("/")):
         raise NotFoundError("the folder name is too long")
-    root, _, inside = require_safe_path(path.rstrip("/")).partition("/")
+    names = ", ".join(sorted(folders))
+    try:
+        root, _, inside = require_safe_path(path.rstrip("/")).partition("/")
+    except UnsafePathError as error:
+        hint = f"Write FOLDER/FILE, where FOLDER is one of: {names}."
+        raise UnsafePathError(error.message, hint=hint) from error
     if root not in folders:
-        names = ", ".join(sorted(folders))
         raise NotFoundError(
             f'there is no folder "{root}" to import from', hint=f"There are: {names}."
         )

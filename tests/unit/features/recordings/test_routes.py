@@ -127,6 +127,12 @@ class TestAddRecording:
         job = finished(api.post(API, json=body))
         assert (job.state, job.sentence) == ("cancelled", "The recording was removed.")
 
+    def test_an_absolute_path_is_refused_with_how_it_is_written(self, api, film: Path) -> None:
+        body = {"dataset": "cup", "source": {"folder": str(film)}}
+        refused = api.post(API, json=body)
+        assert refused.status_code == 400
+        assert refused.json()["hint"] == "Write FOLDER/FILE, where FOLDER is one of: films."
+
     def test_what_has_no_name_of_a_video_is_refused_at_once(self, api, film: Path) -> None:
         (film.parent / "notes.txt").write_text("x")
         for inside in ("films/notes.txt", "films"):
