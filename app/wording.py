@@ -18,15 +18,25 @@ def plural(count: int, one: str, several: str | None = None) -> str:
     return f"{count:,} {one if count == 1 else several or f'{one}s'}"
 
 
+_TURNS = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
+
+
+def is_visible(text: str) -> bool:
+    """Whether a text has a character that leaves a mark."""
+    return any(unicodedata.category(character)[0] not in "ZC" for character in text)
+
+
 def is_one_line(text: str) -> bool:
-    r"""Whether a text that people typed has no control character and no end of a line.
+    r"""Whether a text that people typed has no control character, no end of a line, nor turns the direction of
+    what stands beside it.
 
     Example:
         >>> is_one_line("\u30dc\u30fc\u30eb\u3000\u78ba\u8a8d"), is_one_line("two\nlines")
         (True, False)
     """
     return not any(
-        unicodedata.category(character) in ("Cc", "Cs", "Zl", "Zp") for character in text
+        unicodedata.category(character) in ("Cc", "Cs", "Zl", "Zp") or character in _TURNS
+        for character in text
     )
 
 

@@ -119,13 +119,15 @@ def hold_server_lock(
 ) -> Iterator[Callable[[str], None]]:
     """Hold the home for one server, or ``shared`` for several; the file tells a process id.
 
-    The value is to be called with the address of the server once it is known (``read_server_address``).
+    The value is to be called with the address of the server once it is known (``read_server_address``); of
+    several servers the file tells of the first.
 
     Raises:
         StorageError: Another server holds it.
     """
     handle = _open_lock_file(make_home(settings) / SERVER_LOCK)
     try:
+        beside = shared and not try_to_lock(handle, 0.0)
         # A command that looks for the address holds it for a moment.
         if not try_to_lock(handle, NOTICE_SECONDS, fcntl.LOCK_SH if shared else fcntl.LOCK_EX):
             holder = _read_lock_lines(handle)[0]
@@ -136,6 +138,8 @@ def hold_server_lock(
             )
 
         def tell_address(address: str) -> None:
+            if beside:
+                return
             os.ftruncate(handle, 0)
             os.pwrite(handle, f"{os.getpid()}\n{address}\n".encode(), 0)
 
@@ -153,7 +157,9 @@ def read_server_address(settings: Settings) -> str | None:
     try:
         if try_to_lock(handle, 0.0):
             return None
-        return (_read_lock_lines(handle)[1:] or [""])[0] or None
+        holder, address, *_ = [*_read_lock_lines(handle), ""]
+        is_alive = holder.isdigit() and Path("/proc", holder).exists()
+        return address if is_alive and address else None
     finally:
         os.close(handle)
 

@@ -199,10 +199,7 @@ def read_predicted_cameras(
         raise found.report.problems[0] if found.report.problems else problem
     meant: dict[str, tuple[int, ...]] = {}
     for name in cameras:
-        frame = names.find(name)
-        meant[name] = (
-            (frame.id,) if frame is not None else names.find_station_frames(name, path.stem)
-        )
+        meant[name] = _find_frames_of_camera(names, name, path.stem)
         if not meant[name]:
             found.unknown[name] += 1
             found.reasons[name] = names.explain_unknown_name(name)
@@ -226,6 +223,17 @@ def read_predicted_cameras(
                 found.report.add_problem_at(path.name, name, "principal_point", message)
             found.cameras[identity] = _resize_camera(camera, made_for, annotated)
     return found
+
+
+def _find_frames_of_camera(names: FrameNameIndex, name: str, top_folder: str) -> tuple[int, ...]:
+    """Ids of the frames that a camera is of; folders of a place on a disk count where they name something."""
+    place = name.lstrip("/")
+    for meant in dict.fromkeys((place, name.rsplit("/", 1)[-1] if place != name else place)):
+        if (frame := names.find(meant)) is not None:
+            return (frame.id,)
+        if found := names.find_station_frames(meant, top_folder):
+            return found
+    return ()
 
 
 def _resize_camera(camera: Camera, made_for: ImageSize | None, annotated: ImageSize) -> Camera:

@@ -187,7 +187,7 @@ def _report_files_not_called_camera(
 def _camera_key(name: str) -> str:
     place = PurePosixPath(name)
     found = _FILE.fullmatch(place.name)
-    return str(place.with_name(found.group(1) if found else place.stem))
+    return "/".join((*place.parts[:-1], found.group(1) if found else place.stem))
 
 
 def _read_camera_file(
@@ -236,8 +236,11 @@ def _read_covariance(item: Any, camera: Camera, shown: str, record: str | None) 
 
 
 def _camera_key_of_record(record: str) -> str:
-    """Key of a camera that is named in a file: as ``_camera_key`` of the image's place."""
-    place = PurePosixPath(_ROOT.sub("", record.replace("\\", "/")))
+    """Key of a camera that is named in a file: as ``_camera_key`` of the image's place.
+
+    It begins with / where that is a place on somebody's disk, whose folders need not name anything.
+    """
+    place = PurePosixPath(_ROOT.sub("/", record.replace("\\", "/")))
     return str(place.with_suffix("")) if _IMAGE.fullmatch(place.suffix) else record
 
 

@@ -123,7 +123,7 @@ _HOLDER = re.compile(
 class HolderFolders:
     """Tells folders that hold files of any group or match, as ``labels`` and ``predict2``.
 
-    Every other folder may be the name of one. So may ``frame_99`` where a group is called ``frame_7``.
+    Every other folder may be the name of one. So may "frame_99" where a group is called "frame_7".
 
     Args:
         names: Of the groups and matches of a dataset.

@@ -110,8 +110,7 @@ class LoneFrameUncertainty:
         if not (off > limit).any():
             return None
         size = np.where(off > limit, found, used).round(1)
-        off = np.abs(size - used)
-        axis = int(np.argmax(off / self.sizes_sigma))
+        axis = int(np.argmax(np.where(off > limit, off / self.sizes_sigma, 0.0)))
         return OtherPitch(
             tuple(size.tolist()),
             (pitch.length, pitch.width),

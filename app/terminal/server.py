@@ -200,8 +200,14 @@ def _translate_client_error(server: ServerPlace, error: Exception) -> ReviewErro
     message, hint = getattr(error, "message", str(error)), getattr(error, "hint", None)
     said_nothing = getattr(error, "status", None) == 0
     if said_nothing and "WRONG_VERSION_NUMBER" in message:
+        from app.config import is_local
+
+        here = is_local(urlsplit(server.url).hostname or "")
         return InputError(
-            f"{server.url} answers without TLS", hint="Write the address as http://NAME."
+            f"{server.url} answers without TLS",
+            hint="Write the address as http://..."
+            if here
+            else "Name the port of the proxy with TLS, or run the command on the server's machine.",
         )
     if said_nothing and ("certificate" in message.lower() or "ssl" in message.lower()):
         return InputError(

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from app.geometry.arrays import FloatArray, IntArray
 from app.geometry.camera import Camera
 
-LONGEST_GAP_S = 0.2
+LONGEST_GAP_S, ROUNDED_S = 0.2, 1e-3
 """Between two rays of the ball beyond which nothing is known of those between."""
 _LEAST_SIGMA_PX = 0.3
 """No centre of a ball is known better: whole pixels alone leave this."""
@@ -128,7 +128,7 @@ def estimate_ray_velocities(rays: BallRays) -> tuple[FloatArray, FloatArray, Flo
     at = np.arange(count)[:, None] + np.arange(-_SLOPE_NEAR, _SLOPE_NEAR + 1)
     inside = (at >= 0) & (at < count)
     at = np.clip(at, 0, count - 1)
-    inside &= np.abs(rays.times[at] - rays.times[:, None]) <= LONGEST_GAP_S
+    inside &= np.abs(rays.times[at] - rays.times[:, None]) <= LONGEST_GAP_S + ROUNDED_S
     members = inside.sum(axis=1, keepdims=True)
     mean = np.where(inside, rays.times[at], 0.0).sum(axis=1, keepdims=True) / members
     step = np.where(inside, rays.times[at] - mean, 0.0)
@@ -195,7 +195,9 @@ def _distance_from_neighbour_path(
             _perpendicular_component(directions[at] - path, directions[at]), axis=1
         )
         spread = np.sqrt(1 + share**2 + (1 - share) ** 2)
-        near = np.maximum(np.abs(times[at] - t0), np.abs(times[at] - t1)) <= LONGEST_GAP_S
+        near = (
+            np.maximum(np.abs(times[at] - t0), np.abs(times[at] - t1)) <= LONGEST_GAP_S + ROUNDED_S
+        )
         found[at] = np.minimum(found[at], np.where(near, miss * scale[at] / spread, np.inf))
     found[~np.isfinite(found)] = 0.0
     return found

@@ -68,10 +68,12 @@ def track_ball(
         explain_too_few_measurements(measurements) if len(frames) else "The stretch has no frames."
     )
     if reason is None:
-        shift = (known or ViewErrors()).time_shifts(measurements.view_names)
+        unshifted = shift = (known or ViewErrors()).time_shifts(measurements.view_names)
+        before: list[TrackRun] = []
         for turn in range(_SHIFTS):
             runs = solve_runs(shift)
             odd = None if known is not None else _explain_inconsistent_view(measurements, runs)
+            before = before or ([] if odd else runs)
             if known is not None or turn == _SHIFTS - 1:
                 break
             if odd is not None or all(run.fitted is None for run in runs):
@@ -83,6 +85,9 @@ def track_ball(
             if np.abs(found - shift).max() < _LATE_SETTLED_S:
                 break
             shift = found
+        if _count_used_rays(runs) < _count_used_rays(before):
+            # Cameras that are inexact look late; what contradicts more is no better.
+            runs, shift, odd = before, unshifted, None
         reason = next((run.reason for run in runs if run.reason), None)
         if odd is not None:
             reason = odd
@@ -93,6 +98,12 @@ def track_ball(
             reason = OPEN
     return BallTrack.make_empty_track(
         frames, times, reason or "No series of measurements is long enough."
+    )
+
+
+def _count_used_rays(runs: list[TrackRun]) -> int:
+    return sum(
+        int(run.used.sum()) for run in runs if run.fitted is not None and run.used is not None
     )
 
 

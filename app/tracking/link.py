@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from app.geometry.arrays import FloatArray, IntArray
-from app.tracking.ball_rays import LONGEST_GAP_S, BallRays
+from app.tracking.ball_rays import LONGEST_GAP_S, ROUNDED_S, BallRays
 from app.tracking.link_fit import (
     FASTEST,
     FEWEST_PAIRS,
@@ -63,7 +63,7 @@ def fit_time_map(
             reason = f"The {name} has {len(rays)} rays to the ball; a link needs {FEWEST_PAIRS}."
             return TimeMap(reason)
         step = estimate_frame_interval_s(rays)
-        if step > (LONGEST_GAP_S if rays is live else LONGEST_GAP_S / SLOWEST):
+        if step > (LONGEST_GAP_S if rays is live else LONGEST_GAP_S / SLOWEST) + ROUNDED_S:
             reason = (
                 f"The frames of the {name} that show the ball are {step:.3g} s apart; a link needs them within "
                 f"{LONGEST_GAP_S:g} s of live time. Times are in seconds."

@@ -9,7 +9,13 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from app.geometry.arrays import FloatArray, IntArray
-from app.tracking.ball_rays import LONGEST_GAP_S, BallRays, BoolArray, estimate_ray_velocities
+from app.tracking.ball_rays import (
+    LONGEST_GAP_S,
+    ROUNDED_S,
+    BallRays,
+    BoolArray,
+    estimate_ray_velocities,
+)
 from app.tracking.link_kernels import score_ray_meetings
 from app.tracking.time_map import TimeMap
 
@@ -131,7 +137,7 @@ def _interpolate_rays(
     """Positions and directions on the way from a ray to the next, and whether that is near enough."""
     gap = rays.times[before + 1] - rays.times[before]
     share = (times - rays.times[before]) / gap
-    known = (gap <= LONGEST_GAP_S) & (share >= 0) & (share <= 1)
+    known = (gap <= LONGEST_GAP_S + ROUNDED_S) & (share >= 0) & (share <= 1)
     share = share[:, None]
     positions = (1 - share) * rays.positions[before] + share * rays.positions[before + 1]
     directions = (1 - share) * rays.directions[before] + share * rays.directions[before + 1]

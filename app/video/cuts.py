@@ -26,6 +26,8 @@ FLASH_SECONDS = 0.28
 """Longest flash."""
 MOST_RETURN = 0.6
 """Share of a change that is left once a flash is over."""
+FLASHED = 0.1
+"""Share of a change that is left behind a flash in which nothing moves far."""
 LEAST_FADING = 0.1
 """Share of that change by which a flash fades from frame to frame at its end."""
 
@@ -75,6 +77,9 @@ def _has_foreign_frames(
 ) -> bool:
     """Whether two changes are the ends of a foreign picture between two shots, which show nothing of each other."""
     before = first - 1
+    away = _mean_cell_difference(rows["cells"], before, np.array([first, last]))
+    if away[1] < FLASHED * away[0]:
+        return False
     lags = convert_lags_to_frames(1 / step)
     at, lag = next((at, lag) for at, lag in enumerate(lags) if before + lag >= last)
     after = before + lag

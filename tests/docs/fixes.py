@@ -78,7 +78,7 @@ FINDINGS: dict[str, tuple[tuple[str, ...], str]] = {
     "upstream_changed": ((), "keep it, or send what the files say: `PATCH /views/{id}/...`"),
     "pitch_size": (
         (),
-        "`PATCH /datasets/{id}/pitches` with the size that is proposed; of a frame alone, name its match",
+        "`PATCH /datasets/{id}/pitches` with the size that is proposed; of a frame alone, import it anew with its match",
     ),
     "track_disagrees": (
         ("move_ball", "exclude_view"),

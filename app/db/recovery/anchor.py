@@ -31,9 +31,13 @@ AGAIN_SECONDS = 0.01
 """A reader beside a writer may see half of an anchor: after so long it is read once more."""
 RESTORE = "Run touchline restore BACKUP, or touchline restore {file} to continue with the content of that file."
 RESTORE_SERVER = (
-    "After pg_restore of an older dump this is expected: move home.json away and start again."
-    " Otherwise restore the newest dump, or let TOUCHLINE_DATABASE_URL name the database of this home."
+    "Let TOUCHLINE_DATABASE_URL name the database of this home, or restore it with pg_restore."
 )
+OLDER_DUMP = (
+    "After pg_restore of an older dump this is expected: move home.json away and start again."
+    " Otherwise restore the newest dump."
+)
+"""Where the log of a server's database is shorter than its home recorded."""
 
 
 @dataclass(frozen=True)
@@ -187,7 +191,7 @@ def _require_matches_anchor(
         raise DamagedError(
             f"the log in {database} ends after {entries:,} entries, but this home recorded"
             f" {anchor.entries:,}",
-            hint=hint,
+            hint=OLDER_DUMP if hint == RESTORE_SERVER else hint,
         )
     if anchor.entries:
         query = text("SELECT hash FROM log WHERE id = :id")

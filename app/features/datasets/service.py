@@ -41,7 +41,7 @@ from app.json_text import quote_text
 from app.sample.fixture import LEAGUES
 from app.soccer.codec import policy_to_json
 from app.soccer.policy import Policy
-from app.wording import is_one_line
+from app.wording import is_one_line, is_visible
 
 
 class HasMatch(Protocol):
@@ -118,7 +118,7 @@ def strip_and_check_title(text: str, what: str) -> str:
         InputError: It is empty, too long, or holds control characters.
     """
     text = text.strip()
-    if not text or len(text) > MAX_TITLE:
+    if not is_visible(text) or len(text) > MAX_TITLE:
         raise InputError(
             f"the name of {what} must have 1 to {MAX_TITLE} characters", pointer="/name"
         )

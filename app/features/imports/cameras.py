@@ -179,12 +179,13 @@ class _StationNames:
         """What a name means.
 
         A folder that names neither group nor match does not matter where it holds files of any of
-        them (``HolderFolders``), or only one view has the name.
+        them (``HolderFolders``), only one view has the name, or the name is a place on a disk.
 
         Raises:
             ValueError: It means nothing, or views of several matches; a message for people.
         """
-        parts = compose_name(name).split("/")
+        is_on_disk = name.startswith("/")
+        parts = compose_name(name.lstrip("/")).split("/")
         for start in range(len(parts)):
             known = "/".join(parts[start:])
             if known not in self._places:
@@ -194,7 +195,7 @@ class _StationNames:
             others = self._holders.find_other_folders(folders)
             # Three of them may be the league, season and match of another one.
             alone = len(found) == 1 and (len(folders) < 3 or not found[0].match)
-            if others and not alone and known not in self._telling:
+            if others and not (is_on_disk or alone or known in self._telling):
                 raise ValueError(f'folder "{others[-1]}" names no group or match')
             if len(matches := sorted({place.match for place in found})) > 1:
                 raise ValueError(

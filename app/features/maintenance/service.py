@@ -14,7 +14,7 @@ from app.errors import InputError
 from app.features.audit.service import add_audit_event
 from app.features.people.queries import read_team_setting, write_team_setting
 from app.json_text import Moment, json_text
-from app.wording import is_one_line
+from app.wording import is_one_line, is_visible
 
 _BANNER = "maintenance"
 """Name of the setting."""
@@ -59,7 +59,7 @@ def set_banner(
             begins.
     """
     text = text.strip()
-    if not text or len(text) > LONGEST:
+    if not is_visible(text) or len(text) > LONGEST:
         raise InputError(f"a notice must have 1 to {LONGEST} characters", pointer="/text")
     if not is_one_line(text):
         raise InputError("a notice must be one line without control characters", pointer="/text")

@@ -152,7 +152,7 @@ class TestReadCameras:
         names = ["north.jpg", "images/south.png", "C:\\frames\\east.jpg", "/data/west.jpg"]
         (tmp_path / "predictions.json").write_text(json.dumps(dict.fromkeys(names, value)))
         assert list(read_cameras(tmp_path, report)) == [
-            "north", "images/south", "frames/east", "data/west",
+            "north", "images/south", "/frames/east", "/data/west",
         ]  # fmt: skip
 
     def test_the_wrapper_of_pnlcalib_is_taken_off(

@@ -447,7 +447,7 @@ class TestRefusals:
     def test_tls_that_fails_is_told_as_such(self, place: Place) -> None:
         secure = place.url.replace("http://", "https://")
         done = CliRunner().invoke(app, ["--server", secure, "datasets", "list"])
-        assert "has a TLS certificate that cannot be verified" in str(done.exception)
+        assert "answers without TLS" in str(done.exception)
 
     def test_an_answer_that_only_sounds_like_it_is_told_as_it_is(self) -> None:
         server = ServerPlace("http://127.0.0.1:8000", None)

@@ -83,6 +83,15 @@ class TestHardCuts:
         film = shot[:30] + rendered(7, frames) + shot[30:]
         assert cuts_of(indexed(tmp_path, film, settings)) == []
 
+    def test_a_flash_of_two_frames_is_no_cut_at_a_variable_rate(
+        self, tmp_path: Path, settings: Settings
+    ) -> None:
+        film = flash(rendered(3, 60), 30, 2)
+        path = write_film(tmp_path / "film.mp4", film)
+        dice = np.random.default_rng(5)
+        vary_times(path, dice.choice([256, 512, 1024], len(film)).tolist())
+        assert cuts_of(index_recording(path, settings)) == []
+
     @pytest.mark.parametrize("speed", [0.1, 0.2, 0.35])
     def test_a_whip_pan_is_no_cut(self, speed: float, tmp_path: Path, settings: Settings) -> None:
         still = np.hstack([rendered(1, 1)[0], rendered(1, 1)[0][:, ::-1], rendered(2, 1)[0]])

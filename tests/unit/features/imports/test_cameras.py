@@ -199,6 +199,10 @@ class TestIngestCameras:
         assert {error.problem for error in report.left_out.problems} == {
             'folder "d" names no group or match'
         }
+        # A record may name its image by the place that it had on somebody's disk.
+        report = attach(store, {"/home/ann/frames/a/7": replace(opposite, skew=1.5)})
+        assert (report.problems, list_groups_with_camera()) == ([], {"a": 1.5})
+        attach(store, {"a/7": replace(opposite, skew=1.0)})
         # A camera of one view counts before that of its rig.
         rig = {"b/7": replace(opposite, skew=2.0), "cameras/7": replace(opposite, skew=3.0)}
         report = attach(store, rig)
