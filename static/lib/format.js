@@ -32,10 +32,12 @@ export function pixels(value) {
 	return fixed(value, size >= 99.95 ? 0 : 1);
 }
 
-/** Pixels with their unit: "7.3 px". @param {number | null | undefined} value */
+/** Pixels with their unit, for sentences: "7.3 px", "1,720 px", ">20,000 px". @param {number | null | undefined} value */
 export function pixelText(value) {
-	const text = pixels(value);
-	return text === NONE ? text : `${text} px`;
+	const size = Math.abs(value ?? 0);
+	if (size >= BEYOND) return `>${count(BEYOND)} px`;
+	if (size >= 999.5) return `${(value ?? 0) < 0 ? MINUS : ''}${count(Math.round(size))} px`;
+	return fixed(value, size >= 99.95 ? 0 : 1, ' px');
 }
 
 /** An angle: "44.5°". @param {number | null | undefined} value */

@@ -7,7 +7,7 @@ import { useCallback } from 'preact/hooks';
 import { plainMarking } from '../geometry/marking_words.js';
 import { Canvas } from '../lib/canvas.js';
 import { colours } from '../lib/colours.js';
-import { pixelText } from '../lib/format.js';
+import { pixelText, pixels } from '../lib/format.js';
 import { useSize } from '../lib/hooks.js';
 import { drawStrip } from '../overlays/line_strip.js';
 import { useFrames, usePixels } from '../state/frames.js';
@@ -62,7 +62,7 @@ function Strip({ row, width, pixels: data }) {
 				${marking.polyline.length > 1
 					? html`<${Canvas} class="line-row__strip" width=${width} height=${STRIP} draw=${draw} name="" />`
 					: html`<span class="line-row__none">outside this view</span>`}
-				<span class="line-row__value" data-grade=${marking.grade}>${pixelText(marking.largest)}</span>
+				<span class="line-row__value" data-grade=${marking.grade}>${pixels(marking.largest)} px</span>
 			</button>
 		</li>
 	`;

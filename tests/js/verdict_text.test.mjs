@@ -70,6 +70,7 @@ describe('numbers with their unit', () => {
 		assert.deepEqual([44.46, null].map(degrees), ['44.5°', '–']);
 		assert.deepEqual([-34.761, 0.067, undefined].map(metres), ['−34.76 m', '0.07 m', '–']);
 		assert.deepEqual([7.26, 126.8, null].map(pixelText), ['7.3 px', '127 px', '–']);
+		assert.deepEqual([999.5, 1719.8, -1040, 319_000].map(pixelText), ['1,000 px', '1,720 px', '−1,040 px', '>20,000 px']);
 	});
 });
 

@@ -23,7 +23,7 @@ const CHOICES = /** @type {{name: Accepted, label: string, note: string}[]} */ (
 
 /** @param {number | null} before @param {number | null} after */
 function change(before, after) {
-	return before === null || after === null ? '–' : `${pixels(before)} → ${pixelText(after)}`;
+	return before === null || after === null ? '–' : `${pixels(before)} → ${pixels(after)} px`;
 }
 
 /** @param {{proposal: RigProposal}} props */

@@ -3,7 +3,7 @@
 
 import { html } from 'htm/preact';
 
-import { capital, fixed, metres, pixelText, pixels, words } from '../../lib/format.js';
+import { capital, fixed, metres, pixelText, words } from '../../lib/format.js';
 import { numbers, pair, pointed, pointOut } from '../../state/compare.js';
 import { Letter } from '../letter.js';
 
@@ -69,7 +69,7 @@ export function NumberCard({ names, limits, letter }) {
 					${ball?.sigmas_m.some((one) => one !== null) ? html`<${Row} label="σ of both 3D balls" value=${ball.sigmas_m.map((one) => metres(one)).join(' and ')} />` : null}
 					${view.lines.map((line) => html`<${Row}
 						key=${line.marking} label=${line.marking}
-						value=${line.only ? `only annotation ${names[line.only === 'a' ? 0 : 1]}` : `${pixelText(line.mean_px)}, at most ${pixels(line.largest_px)}`}
+						value=${line.only ? `only annotation ${names[line.only === 'a' ? 0 : 1]}` : `${pixelText(line.mean_px)}, at most ${pixelText(line.largest_px)}`}
 						grade=${line.only ? 'warn' : gradeOf(line.largest_px, limits.line_px)} />`)}
 				</tbody></table>
 			</div>
