@@ -2,13 +2,14 @@
 /** What the thresholds cost: sliders, funnel and curves, redrawn while one drags. */
 
 import { html } from 'htm/preact';
-import { useLayoutEffect, useState } from 'preact/hooks';
+import { useLayoutEffect, useRef, useState } from 'preact/hooks';
 
 import { getPolicies, getPolicy, putPolicy } from '../api/policies.js';
 import { count, words } from '../lib/format.js';
 import { useResource } from '../lib/resource.js';
 import { address, navigate, page, place } from '../lib/router.js';
 import { loadDatasets } from '../state/datasets.js';
+import { explain } from '../state/notice.js';
 import { textsOf, useWhatIf, valuesIn } from '../state/what_if.js';
 import { DatasetFrame } from './dataset_frame.js';
 import { pageAddress } from './dataset_menu.js';
@@ -38,27 +39,42 @@ function Difference({ answer, name, changed }) {
 	`;
 }
 
-/** Write the thresholds into the address once they rest, so that a reload and Back find them. @param {string} dataset @param {Values} values */
-function useValuesInAddress(dataset, values) {
+/**
+ * Thresholds that differ from those of the saved policy. They are written into the address once they rest, so that a reload finds them; links and Back set them.
+ *
+ * @param {string} dataset @param {Values} present
+ * @returns {[Values, (values: Values) => void]}
+ */
+function useValuesInAddress(dataset, present) {
+	const { search } = place.value;
+	const [values, setValues] = useState(() => valuesIn(search, present));
+	const known = useRef(search);
+	useLayoutEffect(() => {
+		if (search === known.current) return;
+		known.current = search;
+		setValues(valuesIn(search, present));
+	}, [search]);
 	useLayoutEffect(() => {
 		const timer = setTimeout(() => {
 			const shown = page.peek();
 			// The next page may be asked for and not yet drawn.
 			if (shown.page !== 'yield' || shown.dataset !== dataset) return;
 			navigate(address(place.peek().path, textsOf(values)), { replace: true });
+			known.current = place.peek().search;
 		}, SETTLED);
 		return () => clearTimeout(timer);
 	}, [values]);
+	return [values, setValues];
 }
 
 /** @param {{one: DatasetJson, loaded: Loaded, reload: () => void}} props */
 function YieldBody({ one, loaded, reload }) {
 	const { policy, etag, shipped, fields } = loaded;
-	const [values, setValues] = useState(() => valuesIn(place.peek().search, policy.values));
+	const [values, setValues] = useValuesInAddress(one.name, policy.values);
 	const [saving, setSaving] = useState(false);
 	const { answer, error } = useWhatIf(one.id, values, policy.hash);
-	useValuesInAddress(one.name, values);
 	const changed = Object.keys(values).length;
+	const off = changed ? null : 'Nothing is changed';
 	/** @param {string} name @param {Threshold} value */
 	function change(name, value) {
 		const { [name]: _, ...rest } = values;
@@ -75,8 +91,8 @@ function YieldBody({ one, loaded, reload }) {
 				${answer ? html`<${Difference} answer=${answer} name=${policy.name} changed=${changed} />` : null}
 				${error ? html`<p class="form__error" role="alert">${error.message}</p>` : null}
 				<p class="buttons">
-					<button data-needs="lead" class="button button--fix" type="button" aria-disabled=${changed === 0} title=${changed ? '' : 'Nothing is changed'} onClick=${() => { if (changed) setSaving(true); }}>Save as policy…</button>
-					<button class="button" type="button" aria-disabled=${changed === 0} title=${changed ? '' : 'Nothing is changed'} onClick=${() => setValues({})}>Reset</button>
+					<button data-needs="lead" class="button button--fix" type="button" aria-disabled=${off !== null} title=${off ?? ''} onClick=${() => { if (off === null) setSaving(true); else explain(`${off}.`); }}>Save as policy…</button>
+					<button class="button" type="button" aria-disabled=${off !== null} title=${off ?? ''} onClick=${() => { if (off === null) setValues({}); else explain(`${off}.`); }}>Reset</button>
 				</p>
 				${answer ? html`<${Distances} answer=${answer} />` : null}
 			</section>

@@ -228,6 +228,20 @@ class TestYield:
         page.get_by_label("As numbers").or_(page.get_by_text("As numbers")).click()
         expect(page.locator(".chart__numbers tbody tr")).to_have_count(101)
 
+    def test_a_link_and_back_set_the_thresholds_of_their_address(self, open_page: OpenPage) -> None:
+        page = open_page("/datasets/sample/yield?min_jac=0.9")
+        slider = page.get_by_label("Smallest share of field lines that fit, slider")
+        expect(slider).to_have_value("0.9")
+        reset = page.get_by_role("button", name="Reset")
+        page.get_by_role("navigation").get_by_role("link", name="Yield", exact=True).click()
+        expect(slider).not_to_have_value("0.9")
+        reset.click(force=True)
+        expect(page.get_by_text("Nothing is changed.")).to_be_visible()
+        page.go_back()
+        expect(slider).to_have_value("0.9")
+        expect(reset).to_have_attribute("aria-disabled", "false")
+        page.wait_for_url("**/yield?min_jac=0.9")
+
     def test_one_that_is_still_counted_says_how_far_it_is_and_comes(
         self, open_page: OpenPage, console
     ) -> None:

@@ -85,7 +85,7 @@ export function CommitBar({ shared }) {
 				<${Action} label="Undo" keys="Ctrl Z" run=${undo} off=${at > 0 || undoable.value ? null : 'Nothing to undo'} />
 				<${Action} label="Redo" keys="Ctrl ⇧ Z" run=${redo} off=${at < steps.length || redoable.value ? null : 'Nothing to redo'} />
 				<${Action} label="Discard" keys="Ctrl Del" run=${discardStaged} off=${off} />
-				<button data-needs="annotate" class="button button--primary" type="button" aria-disabled=${off !== null} title=${off ?? 'Save everything staged as one edit (Ctrl S)'} onClick=${() => { if (off === null) save(); }}>
+				<button data-needs="annotate" class="button button--primary" type="button" aria-disabled=${off !== null} title=${off ?? 'Save everything staged as one edit (Ctrl S)'} onClick=${() => { if (off === null) save(); else explain(`${off}.`); }}>
 					${shared ? 'Save for all its views' : 'Save'} <kbd>Ctrl S</kbd>
 				</button>
 			</div>
