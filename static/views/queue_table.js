@@ -138,6 +138,8 @@ function useScrolling(scroller, list) {
 		// Who had scrolled away from the active row finds what was in sight.
 		if (following.current || (arriving && active !== left.active)) {
 			list.moveTo(reaching(list.top(), element.clientHeight, active));
+			// In a low window the page around the rows scrolls too.
+			if (following.current) element.scrollIntoView({ block: 'nearest' });
 		}
 		remember(shown, list.top() / ROW);
 	}, [arrived, active]);

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
@@ -216,6 +217,27 @@ class TestLowWindow:
         page.mouse.wheel(0, 2000)
         for place in range(3):
             expect(row.nth(place)).to_be_in_viewport(ratio=1)
+
+    def test_the_parts_above_its_rows_stand_below_each_other(self, open_page: OpenPage) -> None:
+        page = open_page("/groups?dataset=sample", size={"width": 720, "height": 450})
+        expect(page.get_by_role("region", name="First steps")).to_be_visible()
+        parts = [page.locator(f".queue > {part}") for part in (".header", ".bars", ".queue__main")]
+        boxes = [box for part in parts if (box := part.bounding_box())]
+        assert len(boxes) == 3
+        for above, below in pairwise(boxes):
+            assert above["y"] + above["height"] <= below["y"] + 0.5
+        field = page.locator(".field--query").bounding_box()
+        assert field
+        assert field["y"] + field["height"] <= boxes[1]["y"] + 0.5
+
+    def test_the_active_row_stays_in_sight_of_keys(self, open_page: OpenPage) -> None:
+        page = open_page("/groups?dataset=sample", size={"width": 720, "height": 450})
+        active = page.locator(".queue-row[data-active=true]")
+        active.wait_for()
+        for key in ("ArrowDown", "ArrowDown", "End", "ArrowUp"):
+            page.keyboard.press(key)
+            expect(active).to_be_focused()
+            expect(active).to_be_in_viewport(ratio=0.9)
 
 
 class TestVerdicts:
