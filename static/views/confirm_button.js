@@ -10,7 +10,10 @@ import { useState } from 'preact/hooks';
  */
 export function ConfirmButton({ label, question, what, small = false, link = false, needs = 'lead', of, run }) {
 	const [asked, setAsked] = useState(false);
-	function press() {
+	/** @param {MouseEvent} event */
+	function press(event) {
+		// The second click of a double click is no answer.
+		if (event.detail > 1) return;
 		setAsked(!asked);
 		if (asked) run();
 	}

@@ -57,7 +57,7 @@ class TestSessions:
         assert (kept["dataset"], (expires - created).days) == ("sample", 30)
         assert kept["scopes"] == ["read", "export"]
         assert serious_in_both(page) == []
-        page.get_by_role("button", name="Revoke nightly").click()
+        page.get_by_role("button", name="Revoke nightly").dblclick()
         page.get_by_role("button", name="Revoke for good? nightly").click()
         expect(page.get_by_role("button", name="Revoke nightly")).to_be_hidden()
         assert httpx.get(f"{team}/api/v1/datasets", headers=given).status_code == 401
