@@ -73,7 +73,8 @@ def track_ball(
         for turn in range(_SHIFTS):
             runs = solve_runs(shift)
             odd = None if known is not None else _explain_inconsistent_view(measurements, runs)
-            before = before or ([] if odd else runs)
+            if turn == 0 and odd is None:
+                before = runs
             if known is not None or turn == _SHIFTS - 1:
                 break
             if odd is not None or all(run.fitted is None for run in runs):
