@@ -35,6 +35,9 @@ OPEN = (
 """Why a ball that is seen has no place."""
 _JUMP_S = 1.0
 """How long a jump says how wrong the cameras are that see the ball: of that much, by this time less."""
+_LONE, _LONE_S = 1.3, 2.0
+"""Times its sigma that one view alone leaves a ball uncertain, because its history may be another one: so much
+was measured. It counts farther than this from instants that two views see, seconds."""
 LEAST_TOLD_S = 0.0015
 """Of an offset in time that is told."""
 
@@ -79,6 +82,7 @@ def join_runs(
             continue
         assert run.used is not None and run.noise is not None
         spread = _add_event_time_covariance(knots, fitted)
+        spread[_find_lone_knots(knots, run.used, step)] *= _LONE**2
         seen = np.flatnonzero(np.bincount(knots.at[run.used], minlength=len(knots.times)) > 0)
         sigma = np.sqrt(np.maximum(np.linalg.eigvalsh(spread[:, :3, :3])[:, -1], 0.0))
         known = sigma <= options.most_sigma_m
@@ -190,6 +194,18 @@ def _add_event_time_covariance(knots: TrackKnots, fitted: FittedPath) -> FloatAr
         tail = (1 + off**2) * ndtr(-off) - off * density
         covariance[inside, :3, :3] += (sigma**2 * tail)[:, None, None] * np.outer(change, change)
     return covariance
+
+
+def _find_lone_knots(knots: TrackKnots, used: BoolArray, step: float) -> BoolArray:
+    """Whether each knot is far from all instants that two views see within a frame, shape (K,)."""
+    times, view = knots.times[knots.at[used]], knots.view[used]
+    two = times[1:][(view[1:] != view[:-1]) & (np.diff(times) <= step)]
+    if not len(two):
+        return np.ones(len(knots.times), dtype=bool)
+    after = np.searchsorted(two, knots.times)
+    near = two[np.clip([after - 1, after], 0, len(two) - 1)]
+    lone: BoolArray = np.abs(near - knots.times).min(axis=0) > _LONE_S
+    return lone
 
 
 def _find_events(

@@ -33,7 +33,7 @@ from app.tracking.ball_track import (
     ViewJump,
 )
 
-TRACK_VERSION = "6"
+TRACK_VERSION = "7"
 """Of the solver: tracks of another one are stale."""
 _UPPER = np.triu_indices(6)
 _NEAR_M = 1e-3

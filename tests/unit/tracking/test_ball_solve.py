@@ -272,6 +272,13 @@ class TestOneView:
         assert inside.mean() > 0.8
         assert (np.linalg.norm(off, axis=1) < 1.0).mean() > 0.66
 
+    def test_it_is_wider_farther_than_two_seconds_from_what_two_views_see(self) -> None:
+        alone = tracked(seen({"right": RIGHT}))
+        both = tracked(seen({"right": RIGHT, "left": LEFT}, hide=[("left", 50, len(TIMES))]))
+        times = alone.sigma / both.sigma
+        assert np.nanmedian(times[90:99]) == pytest.approx(1.3, abs=0.05)
+        assert np.nanmedian(times[101:]) == pytest.approx(1.0, abs=0.02)
+
     def test_a_ball_that_stays_in_the_air_is_refused(self) -> None:
         times = TIMES[:30]
         places = np.column_stack([20 * times - 15, 5 * times, -6.0 + 4.9 * (times - 0.6) ** 2])
