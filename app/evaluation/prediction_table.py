@@ -332,12 +332,12 @@ class _PredictedTrackBuilder:
         if (frame if frame is not None else time) in self._seen:
             raise FieldError("frame", "has a ball in an earlier row; this row is left out")
         x, y, z = (read_field(row, name, _read_metres) for name in _PLACE)
-        sigma = _read_sigma(row)
         self._seen.add(frame if frame is not None else time)
         self.frames.append(frame)
         self.times.append(time)
         self.position.append((x, y, z))
-        self.sigma.append(sigma)
+        self.sigma.append(None)
+        self.sigma[-1] = _read_sigma(row)
 
     def build_track(
         self, events: list[tuple[str, int | None, float | None]] | None
@@ -381,7 +381,7 @@ def _read_sigma(row: Mapping[str, str]) -> tuple[float, float, float] | None:
         return None
     x, y, z = (read_field(row, name, fields.parse_number) for name in names)
     if not min(x, y, z) > 0:
-        raise FieldError(names[0], "is not above zero")
+        raise FieldError(names[0], "is not above zero; the position is kept without it")
     return x, y, z
 
 

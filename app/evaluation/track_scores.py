@@ -32,9 +32,11 @@ EVENT_FRAMES = 2
 """Between an event that is predicted and the true one that it is."""
 INSIDE_95 = 7.815
 """Chi-squared with three degrees of freedom."""
+_MOST_STEPS = 1.5
+"""Times the interval of true frames that predictions may be apart, each of which counts for all frames near it."""
 FARTHEST_M, STEP_M = 5.0, 0.05
-NAMED = 5
-"""Stretches that a note names; all are counted."""
+NAMED, PANELS = 5, 6
+"""Stretches that a note names, and that have a panel of their own; all are counted."""
 COLUMNS = (
     Column("mae_m", "MAE", "m", "lower"),
     Column("median_m", "Median", "m", "lower"),
@@ -57,7 +59,12 @@ _CURVES: tuple[tuple[str, str, Literal["line", "dashed"]], ...] = (
     ("compared", "Predicted", "line"),
     ("all", "All frames", "dashed"),
 )
-_MODES = (("flight", "In the air"), ("roll", "On the grass"))
+_MODES = (
+    ("flight", "In the air"),
+    ("roll", "On the grass"),
+    ("held", "Held"),
+    ("out", "Out of play"),
+)
 
 
 @dataclass(frozen=True)
@@ -98,7 +105,7 @@ class _AllTracksComparison:
         error: Metres, NaN where nothing was predicted.
         inside: 1 where the truth is inside of what the prediction calls 95 %, 0 where not, NaN without
             a sigma.
-        stretch, state, mode: Of each.
+        stretch, frame, state, mode: Of each.
         beside: Predicted balls of instants that have no true one.
         events: By stretch: kinds and seconds of true events, of predicted ones (None: none are
             predicted), and how far apart one and the same may be, seconds.
@@ -107,6 +114,7 @@ class _AllTracksComparison:
     error: list[float] = field(default_factory=list)
     inside: list[float] = field(default_factory=list)
     stretch: list[str] = field(default_factory=list)
+    frame: list[int] = field(default_factory=list)
     state: list[str] = field(default_factory=list)
     mode: list[str] = field(default_factory=list)
     beside: int = 0
@@ -156,7 +164,8 @@ def evaluate_tracks(
     tables = [_make_positions_table(found, note)]
     if found.events:
         tables.append(_make_events_table(found))
-    return Evaluation(counts, tuple(tables), (_make_share_within_distance_figure(error),), ())
+    figures = (_make_share_within_distance_figure(error), _make_error_by_frame_figure(found))
+    return Evaluation(counts, tuple(tables), figures, ())
 
 
 def _match_tracks(
@@ -181,45 +190,92 @@ def _add_track_to_comparison(
     found: _AllTracksComparison, track: GroundTruthTrack, predicted: PredictedTrack | None
 ) -> None:
     there = track.has_ball
-    rows = np.full(len(track.frames), -1)
+    rows, apart = np.full(len(track.frames), -1), np.zeros(len(track.frames))
     if predicted is not None:
-        place, apart = _match_predictions_to_rows(track, predicted)
-        known = np.flatnonzero(place >= 0)
-        # The nearest comes last, and stays; of two that are equally near the first.
-        known = known[np.lexsort((-known, -apart[known]))]
-        rows[place[known]] = known
-        found.beside += len(place) - int(there[place[known]].sum())
+        rows, apart, found_beside = _match_predictions_to_rows(track, predicted)
+        found.beside += found_beside
         if predicted.events is not None:
             found.events.append(_collect_track_events(track, predicted))
+    truth = _interpolate_true_positions(track, apart)
     position = np.array([] if predicted is None else predicted.position).reshape(-1, 3)
     sigma = np.zeros((0, 3)) if predicted is None else predicted.sigma_array
     for row in np.flatnonzero(there):
         at = int(rows[row])
-        off = position[at] - track.position[row] if at >= 0 else np.full(3, np.nan)
+        off = position[at] - truth[row] if at >= 0 else np.full(3, np.nan)
         square = float(((off / sigma[at]) ** 2).sum()) if at >= 0 else float("nan")
         found.error.append(float(np.linalg.norm(off)))
         found.inside.append(float(square <= INSIDE_95) if np.isfinite(square) else float("nan"))
         found.stretch.append(track.key)
+        found.frame.append(int(track.frames[row]))
         found.state.append(track.state[row])
         found.mode.append(track.mode[row])
 
 
 def _match_predictions_to_rows(
     track: GroundTruthTrack, predicted: PredictedTrack
-) -> tuple[IntArray, FloatArray]:
-    """The row of the true track of each predicted ball, -1 where there is none, and how far from its time
-    the prediction is, seconds, 0 where both have frame numbers, shapes (M,)."""
+) -> tuple[IntArray, FloatArray, int]:
+    """The prediction of each true frame: of its number, or the nearest in time where it has no number.
+
+    Returns:
+        Its place, -1 where there is none, shape (N,); by how much it is later than the frame, seconds, 0 for
+        frame numbers, shape (N,); how many predictions are of no frame with a true ball.
+    """
+    rows, apart = np.full(len(track.frames), -1), np.zeros(len(track.frames))
     by_frame = {int(frame): row for row, frame in enumerate(track.frames)}
-    half = _estimate_frame_interval_s(track) / 2
-    found, apart = np.full(len(predicted.position), -1), np.zeros(len(predicted.position))
-    for at, (frame, time) in enumerate(zip(predicted.frames, predicted.times, strict=True)):
-        if frame is not None:
-            found[at] = by_frame.get(frame, -1)
-        elif time is not None:
-            row = int(np.abs(track.times - time).argmin())
-            apart[at] = abs(track.times[row] - time)
-            found[at] = row if apart[at] <= half else -1
-    return found, apart
+    there, beside = track.has_ball, 0
+    for at, frame in enumerate(predicted.frames):
+        if frame is None:
+            continue
+        row = by_frame.get(frame, -1)
+        beside += row < 0 or not there[row]
+        if row >= 0 and rows[row] < 0:
+            rows[row] = at
+    timed = [
+        (time, at)
+        for at, (frame, time) in enumerate(zip(predicted.frames, predicted.times, strict=True))
+        if frame is None and time is not None
+    ]
+    if timed:
+        times, places = (np.array(column) for column in zip(*sorted(timed), strict=True))
+        step = _estimate_frame_interval_s(track)
+        rate = float(np.median(np.diff(times))) if len(times) > 1 else step
+        # Fewer predictions a second than frames: some frames are farther than half a frame from all.
+        slack = min(max(step, rate), _MOST_STEPS * step) / 2 + 1e-6
+        near = _find_nearest(times, track.times)
+        late = times[near] - track.times
+        free = (rows < 0) & (np.abs(late) <= slack)
+        rows[free], apart[free] = places[near[free]], late[free]
+        own = _find_nearest(track.times, times)
+        beside += int((~there[own] | (np.abs(track.times[own] - times) > slack)).sum())
+    return rows, apart, beside
+
+
+def _find_nearest(times: FloatArray, asked: FloatArray) -> IntArray:
+    """Places of the increasing times that are nearest to each asked one, the earlier of two, shape (M,)."""
+    after = np.clip(np.searchsorted(times, asked), 0, len(times) - 1)
+    before = np.maximum(after - 1, 0)
+    nearer = np.abs(times[before] - asked) <= np.abs(times[after] - asked)
+    found: IntArray = np.where(nearer, before, after)
+    return found
+
+
+def _interpolate_true_positions(track: GroundTruthTrack, later: FloatArray) -> FloatArray:
+    """Where the true ball is at each frame and so many seconds later, metres, shape (N, 3).
+
+    On the straight line to the next frame on that side, or on with the velocity from the other side where that
+    has no ball.
+    """
+    there, last = track.has_ball, len(track.times) - 1
+    at = np.arange(last + 1)
+    toward = np.where(later > 0, 1, -1)
+    other = at
+    for side in (-toward, toward):
+        beside = np.clip(at + side, 0, last)
+        other = np.where(there[beside] & (beside != at), beside, other)
+    span = track.times[other] - track.times
+    share = np.divide(later, span, out=np.zeros(len(at)), where=span != 0)
+    moved: FloatArray = track.position + share[:, None] * (track.position[other] - track.position)
+    return moved
 
 
 def _estimate_frame_interval_s(track: GroundTruthTrack) -> float:
@@ -239,7 +295,9 @@ def _collect_track_events(
             said.append((kind, by_frame[frame]))
         else:
             said.append((kind, float("inf") if time is None else time))
-    return list(track.events), said, EVENT_FRAMES * step + step / 2
+    # A frame number is up to half a frame from the event's own time.
+    rounded = any(frame is not None for _, frame, _ in predicted.events or ())
+    return list(track.events), said, (EVENT_FRAMES + rounded / 2) * step + 1e-6
 
 
 def _make_positions_table(found: _AllTracksComparison, note: str) -> Table:
@@ -355,13 +413,33 @@ def _make_share_within_distance_figure(error: FloatArray) -> Chart:
     return Chart("track_distance", "Precision of tracks against distance", (panel,), note)
 
 
+def _make_error_by_frame_figure(found: _AllTracksComparison) -> Chart:
+    """How far each predicted ball is off, against its frame, one panel for each stretch."""
+    by_stretch: dict[str, list[tuple[float, float]]] = {}
+    for stretch, frame, error in zip(found.stretch, found.frame, found.error, strict=True):
+        if np.isfinite(error):
+            by_stretch.setdefault(stretch, []).append((float(frame), error))
+    worst = sorted(by_stretch, key=lambda key: -np.mean([error for _, error in by_stretch[key]]))
+    panels = []
+    for key in worst[:PANELS]:
+        frames, errors = zip(*by_stretch[key], strict=True)
+        series = Series("error", "Predicted", frames, errors, "points")
+        axes = Axis("Frame"), Axis("Distance from the ball", "m", 0.0)
+        panels.append(Panel(key, *axes, (series,), (ReferenceLine("y", NEAR_M, "2 m"),)))
+    note = "A frame without a predicted ball has no point."
+    if len(worst) > PANELS:
+        note += f" The {PANELS} stretches with the largest MAE, of {len(worst)}."
+    return Chart("track_error", "Error of tracks by frame", tuple(panels), note)
+
+
 def _describe_counts(
     counts: Mapping[str, int], missed: Sequence[str], unknown: Sequence[str]
 ) -> str:
     said = [
         f"{plural(counts['track_frames'], 'frame')} with a true ball, "
         f"{counts['track_frames_compared']} with a predicted one too. MAE, median and P 2 m are over those; "
-        "inside 95 % counts true places inside the 95 % ellipsoid of the predicted sigmas."
+        "inside 95 % counts true places inside the 95 % ellipsoid of the predicted sigmas. A prediction with a time "
+        "and no frame number is compared with the true ball at that time."
     ]
     if counts["predicted_frames_without_truth"]:
         balls = plural(counts["predicted_frames_without_truth"], "predicted ball")

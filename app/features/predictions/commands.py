@@ -153,8 +153,7 @@ def list_(dataset: Dataset, json_: Json = False) -> None:
         json_,
         vars,
         lambda item: (
-            f"{item.name:24} {item.format:8} {item.created[:19]} "
-            f"{item.boxes:8} boxes in {item.frames} frames, {item.cameras} cameras"
+            f"{item.name:24} {item.format:8} {item.created[:19]} {_describe_contents(vars(item))}"
         ),
     )
 
@@ -342,13 +341,20 @@ def _parse_frame_range(text: str) -> range:
         raise typer.BadParameter(f'--frames "{text}" is not FIRST-LAST') from error
 
 
+def _describe_contents(found: Mapping[str, Any]) -> str:
+    """What a set holds: tracks, or boxes and cameras."""
+    if found["tracks"]:
+        rows = plural(found["report"]["read"], "row")
+        return f"{rows} of {plural(found['tracks'], 'ball track')}"
+    boxes = f"{plural(found['boxes'], 'box', 'boxes')} in {plural(found['frames'], 'frame')}"
+    return f"{boxes}, {plural(found['cameras'], 'camera')}"
+
+
 def print_prediction_set(found: Mapping[str, Any]) -> None:
     """What was read into a set, and what could not be read."""
-    say(
-        f"{found['source']}: {plural(found['boxes'], 'box', 'boxes')} in {plural(found['frames'], 'frame')}, "
-        f"{plural(found['cameras'], 'camera')}, {plural(found['unknown'], 'unknown frame')} "
-        f"(predictions {found['name']})"
-    )
+    unknown = "" if found["tracks"] else f", {plural(found['unknown'], 'unknown frame')}"
+    what = f"{_describe_contents(found)}{unknown}"
+    say(f"{found['source']}: {what} (predictions {found['name']})")
     report = found["report"]
     if report.get("without_score"):
         say(f"  {report['without_score']} boxes have no score and count as sure")

@@ -364,7 +364,7 @@ def evaluate_stored_tracks(
         where = f'the version "{version.name}"' if version else f'"{dataset.name}"'
         raise InputError(
             f"{where} has no accepted ball track",
-            hint="Make and accept its tracks, then freeze a version.",
+            hint="Make and accept its tracks (stale ones do not count), then freeze a version.",
             pointer="/version",
         )
     truth = [_parse_true_track(key, value) for key, value in sorted(values.items())]

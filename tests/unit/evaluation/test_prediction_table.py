@@ -76,6 +76,17 @@ class TestReadTracks:
         assert (track.frames, track.times, track.position) == ((5,), (0.2,), ((1.5, -2.0, -1.0),))
         assert track.sigma == ((0.1, 0.1, 0.1),)
 
+    @pytest.mark.parametrize("sigma", ["0", "-1"])
+    def test_a_ball_without_a_right_sigma_is_kept_without_it(
+        self, tmp_path: Path, sigma: str
+    ) -> None:
+        path = tmp_path / "ball.csv"
+        path.write_text(f"frame,x_m,y_m,z_m,sigma_m\n5,0,0,-1,0.1\n6,1,2,-1,{sigma}\n")
+        found = read(path)
+        assert found.tracks[""].position == ((0.0, 0.0, -1.0), (1.0, 2.0, -1.0))
+        assert found.tracks[""].sigma == ((0.1, 0.1, 0.1), None)
+        assert "kept without it" in str(found.report.problems[0])
+
     @pytest.mark.parametrize(
         ("row", "words"),
         [
@@ -85,7 +96,6 @@ class TestReadTracks:
             (",,1,2,-1", "frame"),
             ("-4,0,1,2,-1", "not the number of a frame"),
             ("1,0,1,2,-4000", "metres from the centre mark"),
-            ("1,0,1,2,-1,-0.1", "not above zero"),
             ("5,0,1,2,-1", "has a ball in an earlier row"),
         ],
     )

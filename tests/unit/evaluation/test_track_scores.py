@@ -88,12 +88,41 @@ class TestEvaluateTracks:
         found = evaluate_tracks([TRUTH], {"": replace(predicted(), events=None)})
         assert found.table("track_events") is None
 
-    def test_times_alone_are_joined_to_the_nearest_frame(self) -> None:
-        track = predicted(0.1)
-        late = replace(track, frames=(None,) * COUNT, times=tuple(at + 0.015 for at in track.times))
-        found = evaluate_tracks([TRUTH], {"": late})
-        assert value(found, "all", "mae_m") == pytest.approx(0.1)
+    @pytest.mark.parametrize(("rate", "shift"), [(25, 0.019), (25, -0.013), (30, 0.0), (24, 0.0)])
+    def test_a_ball_is_compared_at_its_own_time(self, rate: int, shift: float) -> None:
+        """Whatever runs at another rate, or between the frames, is neither punished nor left out."""
+        times = np.arange(TIMES[0] - 0.1, TIMES[-1], 1 / rate) + shift
+        x = (times - TIMES[0]) * 5.0 + 0.1
+        right = PredictedTrack(
+            (None,) * len(times),
+            tuple(times.tolist()),
+            tuple((float(at), 0.0, -1.0) for at in x),
+            (None,) * len(times),
+            (("kick", None, 4.2 + 2.2 / 25),),
+        )
+        found = evaluate_tracks([TRUTH], {"": right})
+        assert value(found, "all", "mae_m") == pytest.approx(0.1, abs=1e-9)
         assert found.counts["track_frames_compared"] == 40
+        assert value(found, "kick", "f1", "track_events") == 0.0
+
+    def test_a_late_clock_is_an_error(self) -> None:
+        late = replace(predicted(), frames=(None,) * COUNT, times=tuple((TIMES + 0.013).tolist()))
+        found = evaluate_tracks([TRUTH], {"": late})
+        assert value(found, "all", "mae_m") == pytest.approx(5.0 * 0.013, abs=1e-9)
+
+    def test_few_balls_a_second_count_for_their_own_frames_alone(self) -> None:
+        few = predicted(rows=range(0, COUNT, 5))
+        few = replace(few, frames=(None,) * len(few.frames))
+        found = evaluate_tracks([TRUTH], {"": few})
+        assert value(found, "all", "coverage") == 0.2
+        assert value(found, "all", "mae_m") == pytest.approx(0)
+
+    def test_the_error_of_each_frame_is_shown(self) -> None:
+        found = evaluate_tracks([TRUTH], {"": predicted(0.3, rows=range(2, 10))})
+        figure = next(one for one in found.figures if one.name == "track_error")
+        series = figure.panels[0].series[0]
+        assert series.x == tuple(range(102, 110))
+        assert series.y == pytest.approx((0.3,) * 8)
 
     @pytest.mark.parametrize("rate", [50, 100])
     def test_of_several_predictions_of_a_frame_the_nearest_in_time_is_compared(

@@ -12,6 +12,7 @@ from app.config import Settings
 from app.db.store import Store
 from app.errors import NotFoundError
 from app.features.imports.ingest import import_groups
+from app.features.predictions.commands import print_prediction_set
 from app.features.predictions.evaluation import parse_run_tables
 from app.features.solutions.service import solve_dataset
 from app.formats.report import ReaderReport
@@ -46,6 +47,14 @@ def test_accept_names_the_sets_that_there_are(home: Path, monkeypatch: pytest.Mo
         CliRunner().invoke(app, words, catch_exceptions=False)
     assert refused.value.message == 'there is no set of predictions "nosuch"'
     assert refused.value.hint is not None and "set" in refused.value.hint
+
+
+def test_a_set_of_tracks_is_told_by_its_tracks(capsys: pytest.CaptureFixture[str]) -> None:
+    report = {"read": 2140, "problems": [], "more_problems": 0}
+    print_prediction_set(
+        {"source": "ball.csv", "name": "p1", "tracks": 1, "unknown": 0, "report": report}
+    )
+    assert capsys.readouterr().out == "ball.csv: 2,140 rows of 1 ball track (predictions p1)\n"
 
 
 @pytest.fixture
