@@ -337,11 +337,11 @@ def _copy_tables(
 
 
 def _read_rows(connection: Connection, table: Table, after: int = 0) -> Iterator[dict[str, Any]]:
-    """The rows of a table by key, a few at a time."""
+    """The rows of a table by key, a few at a time; by the keys of its columns, as ``insert`` takes them."""
     statement = select(table).order_by(*table.primary_key.columns).offset(after)
     found = connection.execute(statement, execution_options={"yield_per": _BATCH})
     for row in found:
-        yield replace_null_characters(dict(row._mapping))
+        yield replace_null_characters(dict(zip(table.columns.keys(), row, strict=True)))
 
 
 def _require_equal_rows(session: Session, connection: Connection) -> dict[str, int]:
