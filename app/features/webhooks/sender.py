@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import ssl
 import threading
+import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
@@ -154,12 +155,11 @@ is given up."""
 SECONDS = 15.0
 """So long a receiver may take for all of its answer."""
 TOGETHER, OF_ONE = 32, 4
-"""Messages that are under way at a time, and of them to one webhook: a slow one holds up others for
-``SECONDS`` at most."""
+"""Messages that are under way at a time, and of them to one webhook: a slow one holds up its own alone."""
 GLANCE_SECONDS = 0.1
 """Between two looks whether the server stops."""
 LOOK_SECONDS = 1.0
-"""At least so long between two looks at the log."""
+"""Between two looks at the log."""
 STALLS_SECONDS = 300.0
 """Between two looks whether a batch has stalled."""
 POLL_SECONDS = 30.0
@@ -265,33 +265,51 @@ class WebhookSender:
         self._stalls_at = at
         return notify_of_stalled_batches(self._store, at)
 
-    def send_due_messages(self) -> int:
+    def send_due_messages(self, look: Callable[[], object] | None = None) -> int:
         """Send what is due, as much as goes at a time; returns how many tries came to an end.
 
-        What is still under way when the server stops is sent again by the next one.
-        """
-        now = self._clock()
-        with self._store.read() as session:
-            due = list_due_deliveries(session, format_utc_time(now), TOGETHER, OF_ONE)
-        answers = asyncio.run(self._send_all_due(due)) if due else []
-        if answers:
-            with self._store.write() as session:
-                for row, answer in answers:
-                    self._save_attempt(session, row, answer)
-        return len(answers)
+        Each answer is kept when it comes. What is still under way when the server stops is sent again by the next one.
 
-    async def _send_all_due(self, due: Sequence[Any]) -> list[tuple[Any, DeliveryAttempt]]:
+        Args:
+            look: Called every ``LOOK_SECONDS`` while tries are under way; what is due then is sent beside them.
+        """
+        return asyncio.run(self._send_all_due(look))
+
+    async def _send_all_due(self, look: Callable[[], object] | None) -> int:
+        ended, tries = 0, dict[asyncio.Task[DeliveryAttempt], DueDelivery]()
         async with httpx.AsyncClient(
             timeout=SECONDS, follow_redirects=False, trust_env=False, verify=_tls_context()
         ) as client:
-            tries = {asyncio.ensure_future(self._send_delivery(client, row)): row for row in due}
-            left = set(tries)
-            while left and not self._closing.is_set():
-                _, left = await asyncio.wait(left, timeout=GLANCE_SECONDS)
-            for task in left:
+
+            def begin_due_tries() -> None:
+                busy = {row.id for row in tries.values()}
+                with self._store.read() as session:
+                    most, now = TOGETHER + len(busy), format_utc_time(self._clock())
+                    due = list_due_deliveries(session, now, most, OF_ONE)
+                free = [row for row in due if row.id not in busy][: TOGETHER - len(busy)]
+                tries.update(
+                    {asyncio.ensure_future(self._send_delivery(client, row)): row for row in free}
+                )
+
+            begin_due_tries()
+            looked = time.monotonic()
+            while tries and not self._closing.is_set():
+                done, _ = await asyncio.wait(
+                    tries, timeout=GLANCE_SECONDS, return_when=asyncio.FIRST_COMPLETED
+                )
+                if done:
+                    with self._store.write() as session:
+                        for task in done:
+                            self._save_attempt(session, tries.pop(task), task.result())
+                    ended += len(done)
+                if look is not None and time.monotonic() - looked >= LOOK_SECONDS:
+                    look()
+                    begin_due_tries()
+                    looked = time.monotonic()
+            for task in tries:
                 task.cancel()
-            await asyncio.gather(*left, return_exceptions=True)
-        return [(row, task.result()) for task, row in tries.items() if task not in left]
+            await asyncio.gather(*tries, return_exceptions=True)
+        return ended
 
     def _run_until_stopped(self) -> None:
         while not self._closing.is_set():
@@ -309,11 +327,15 @@ class WebhookSender:
 
     def _run_once(self) -> float:
         """Tell and send all that can be; seconds until the next look."""
-        self.queue_new_messages()
-        self.queue_stall_messages()
-        while not self._closing.is_set() and self.send_due_messages():
+        self._look()
+        while not self._closing.is_set() and self.send_due_messages(self._look):
             pass
         return self._seconds_until_next_due()
+
+    def _look(self) -> None:
+        """Write down what is new."""
+        self.queue_new_messages()
+        self.queue_stall_messages()
 
     def _seconds_until_next_due(self) -> float:
         """Seconds until something waits to be sent again."""

@@ -281,6 +281,24 @@ class TestTogether:
         (delivery,) = list_deliveries(allowed, "demo", slow)
         assert "no answer" in (delivery.problem or "")
 
+    def test_what_happens_meanwhile_is_told_to_others_at_once(
+        self, allowed, sender, hook, slow, state, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(module, "LOOK_SECONDS", 0.01)
+        said: list[str] = []
+
+        def look() -> None:
+            (*_, first) = list_deliveries(allowed, "demo", hook) or (None,)
+            if first is None:
+                judge(allowed, state)
+                sender.queue_new_messages()
+            elif first.state == "delivered":
+                said.extend(item.state for item in list_deliveries(allowed, "demo", slow))
+                sender.stop()
+
+        sender.send_due_messages(look)
+        assert "waiting" in said and "delivered" not in said
+
     def test_one_of_many_messages_to_it_is_no_reason_to_let_others_wait(
         self, allowed, sender, receiver, hook, slow, state, monkeypatch: pytest.MonkeyPatch
     ) -> None:
