@@ -8,27 +8,45 @@ import { navigate, page } from '../lib/router.js';
 import { dataset, failure, loadDatasets } from './datasets.js';
 import { groupDocument, open } from './group.js';
 import { currentId, firstGroup, lastGroup, locate, query, reviewAddress } from './navigation.js';
-import { complain } from './notice.js';
+import { complain, dismiss, notice } from './notice.js';
 import { resetForGroup } from './workspace.js';
 
 /** The group that was asked for and cannot be shown; 0 while there is none. */
 export const absent = signal(0);
+
+/** Whether it may be shown later: the server was away, or nobody was logged in. */
+export const mayReturn = signal(false);
+
+/** Answers after which the same question may be answered: no network, no session, too many requests, no database. */
+const PASSING = [0, 401, 429, 503];
+
+/** What was said of the group that cannot be shown. @type {import('./notice.js').Notice | null} */
+let said = null;
 
 /** @param {number} id */
 async function enter(id) {
 	absent.value = 0;
 	try {
 		await Promise.all([open(id), locate(id)]);
+		if (said && notice.value === said) dismiss();
 	} catch (error) {
 		if (!(error instanceof ApiError)) throw error;
+		const passes = PASSING.includes(error.status);
 		// While the server is away what is known stays on screen; the save state says so.
-		if (currentId() !== id || (error.status === 0 && groupDocument.value?.id === id)) return;
+		if (currentId() !== id || (passes && groupDocument.value?.id === id)) return;
 		if (error.status === 404) lastGroup.value = 0;
 		absent.value = id;
-		complain(`Group ${id} cannot be shown: ${error.message}`, {
-			label: 'Open the queue', run: () => navigate('/groups'),
-		});
+		mayReturn.value = passes;
+		complain(`Group ${id} cannot be shown: ${error.message}`, passes
+			? { label: 'Try again', run: retry }
+			: { label: 'Open the queue', run: () => navigate('/groups') });
+		said = notice.value;
 	}
+}
+
+/** Ask again for the group that could not be shown, if there is one that may return. */
+export function retry() {
+	if (absent.value && mayReturn.value) enter(absent.value);
 }
 
 /** Without a number: the first group of the queue. */

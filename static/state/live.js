@@ -6,6 +6,7 @@ import { computed, effect, signal, untracked } from '@preact/signals';
 import { listenToGroups } from '../api/events.js';
 import { ApiError } from '../api/problem.js';
 import { page } from '../lib/router.js';
+import { retry } from './arrival.js';
 import { held, overlapsStaged, staging } from './calibration.js';
 import { forget, forgetOthers, known, load, outdate } from './documents.js';
 import { draft, groupDocument, renew } from './group.js';
@@ -70,6 +71,7 @@ async function catchUp() {
  * @param {string | null} dataset in which something changed; null: in any
  */
 function missed(dataset) {
+	retry();
 	const at = groupDocument.value;
 	forgetOthers(at?.id ?? null, dataset);
 	if (at && (dataset === null || dataset === at.dataset.name)) heard({ group: at.id, etag: null, actor: null });

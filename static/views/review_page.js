@@ -8,7 +8,7 @@ import { useKeys } from '../lib/hooks.js';
 import { lazy } from '../lib/lazy.js';
 import { withOtherBall } from '../geometry/estimator.js';
 import { picturesOf } from '../overlays/scene.js';
-import { absent } from '../state/arrival.js';
+import { absent, mayReturn, retry } from '../state/arrival.js';
 import { conflict } from '../state/conflict.js';
 import { group, groupDocument, isPreview, solution } from '../state/group.js';
 import { question } from '../state/return_group.js';
@@ -48,7 +48,7 @@ function Absent() {
 	return html`
 		<main class="review__empty">
 			<h1>Group ${absent.value} cannot be shown</h1>
-			<p><a href="/groups">Open the queue</a></p>
+			<p>${mayReturn.value && html`<button type="button" onClick=${retry}>Try again</button> `}<a href="/groups">Open the queue</a></p>
 		</main>
 	`;
 }

@@ -187,6 +187,50 @@ class TestOutbox:
         leave_as_found(page, [], edited=screen.group)
 
 
+class TestArrival:
+    """The database is away, or the session has ended: a group is read once more."""
+
+    BUSY = {"title": "Busy", "status": 503, "detail": "the database cannot be reached"}
+
+    def test_a_group_that_could_not_be_read_is_shown_when_it_can(
+        self, open_page: OpenPage, console: Any
+    ) -> None:
+        console.expect("503")
+        page = open_page(None)
+        group = int(rows(page)[0]["id"])
+        page.route(
+            f"**/api/v1/groups/{group}", lambda route: route.fulfill(status=503, json=self.BUSY)
+        )
+        page.goto(f"/review/{group}")
+        expect(page.get_by_role("heading", name=f"Group {group} cannot be shown")).to_be_visible()
+        page.unroute(f"**/api/v1/groups/{group}")
+        page.get_by_role("main").get_by_role("button", name="Try again").click()
+        Screen(page).ready()
+        expect(page.get_by_role("alert")).to_have_count(0)
+
+    def test_no_bar_stands_over_a_group_that_is_shown(
+        self, open_page: OpenPage, console: Any
+    ) -> None:
+        console.expect("503")
+        screen, chain = at_last_groups(open_page, console)
+        page = screen.page
+        asked: list[str] = []
+
+        def refuse(route: Route) -> None:
+            asked.append(route.request.url)
+            route.fulfill(status=503, json=self.BUSY)
+
+        page.route(f"**/api/v1/groups/{chain[1]}/neighbours**", refuse)
+        page.route(f"**/api/v1/groups/{chain[1]}", refuse)
+        screen.press("s")
+        page.wait_for_url(f"**/review/{chain[1]}")
+        until(page, lambda: asked)
+        screen.saved()
+        expect(page.get_by_role("alert")).to_have_count(0)
+        page.unroute_all()
+        withdraw_verdict(page, chain[0])
+
+
 def leave_as_found(page: Page, judged: list[int], *, edited: int) -> None:
     """Take back what a test has said."""
     for group in judged:
