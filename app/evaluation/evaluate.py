@@ -5,7 +5,7 @@ reference boxes (the paper's table 1).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from app.evaluation import sensitivity
@@ -70,8 +70,8 @@ def make_boxes_table(
 ) -> Table:
     """IoU and size error of every kind of box, over the same frames for each.
 
-    A frame takes part when it has a reference box and all three boxes of the dataset. Where there
-    are detections, one more row measures the surest of each frame that overlaps the reference box.
+    A frame takes part when it has a reference box and every kind of box that the dataset's frames with one have. Where
+    there are detections, one more row measures the surest of each frame that overlaps the reference box.
 
     Args:
         frames: Of the dataset.
@@ -82,8 +82,9 @@ def make_boxes_table(
             opens the frames.
     """
     compared = _select_comparable_boxes(frames, reference)
+    kinds = list_kinds_of_boxes(frames, reference)
     rows = [
-        _make_box_row(kind, label, [(frame, frame.boxes[kind], box) for frame, box in compared], resamples,
+        _make_box_row(kind, label, [(frame, frame.boxes[kind], box) for frame, box in compared if kind in kinds], resamples,
              len(reference), FrameFieldRange("box_iou") if kind == truth else None)
         for kind, label in ROWS
     ]  # fmt: skip
@@ -97,8 +98,8 @@ def make_boxes_table(
             _make_box_row("detected", "Detected boxes, IoU > 0", found, resamples, len(reference))
         )
     note = (
-        f"{len(compared)} frames that have a reference box and a 3D ball, of {len(reference)} reference "
-        f"boxes. Size error is |d - d reference| in per cent of the reference box's diagonal. "
+        f"{len(compared)} frames that have a reference box and every kind of box below, of {len(reference)} reference "
+        f"boxes.{_describe_missing_kinds(kinds)} Size error is |d - d reference| in per cent of the reference box's diagonal. "
         f"The row of the run's true box opens its frames; the figure of boxes has every frame of "
         f"every row."
     )
@@ -115,6 +116,7 @@ def make_boxes_figure(
         reference: The reference box by id of the frame.
         distances: Camera to ball, metres, by id of the frame; frames without one are left out.
     """
+    kinds = list_kinds_of_boxes(frames, reference)
     compared = sorted(
         (distances[frame.id], frame.id, frame, box)
         for frame, box in _select_comparable_boxes(frames, reference)
@@ -130,7 +132,11 @@ def make_boxes_figure(
             title,
             Axis("Distance to the camera", "m"),
             axis,
-            tuple(_make_scatter_series(kind, label, compared, measure) for kind, label in ROWS),
+            tuple(
+                _make_scatter_series(kind, label, compared, measure)
+                for kind, label in ROWS
+                if kind in kinds
+            ),
         )
         for title, axis, measure in measures
     )
@@ -159,16 +165,30 @@ def _make_scatter_series(
 def _select_comparable_boxes(
     frames: Sequence[GroundTruthFrame], reference: Mapping[int, Box]
 ) -> list[tuple[GroundTruthFrame, Box]]:
+    kinds = list_kinds_of_boxes(frames, reference)
     return [
         (frame, reference[frame.id])
         for frame in frames
-        if frame.id in reference and has_every_box(frame)
+        if frame.id in reference and has_boxes(frame, kinds)
     ]
 
 
-def has_every_box(frame: GroundTruthFrame) -> bool:
-    """Whether it has every kind of box, so that all rows are over the same frames."""
-    return all(kind in frame.boxes for kind, _ in ROWS)
+def list_kinds_of_boxes(
+    frames: Iterable[GroundTruthFrame], reference: Mapping[int, Box]
+) -> tuple[str, ...]:
+    """The kinds of box that any frame with a reference box has: a dataset of points has none that was drawn."""
+    found = {kind for frame in frames if frame.id in reference for kind in frame.boxes}
+    return tuple(kind for kind, _ in ROWS if kind in found)
+
+
+def has_boxes(frame: GroundTruthFrame, kinds: Sequence[str]) -> bool:
+    """Whether it has a box of every kind, so that all rows are over the same frames; not of none."""
+    return bool(kinds) and all(kind in frame.boxes for kind in kinds)
+
+
+def _describe_missing_kinds(kinds: Sequence[str]) -> str:
+    missing = [label.lower() for kind, label in ROWS if kind not in kinds]
+    return f" No frame has {' or '.join(missing)}." if missing and kinds else ""
 
 
 def _make_box_row(
@@ -312,6 +332,7 @@ def _measure_frames(
     options: EvaluationOptions,
 ) -> list[FrameResult]:
     cameras, reference = inputs.cameras or {}, inputs.reference or {}
+    kinds = list_kinds_of_boxes((item.frame for item in judged), reference)
     results = []
     for item in judged:
         frame = item.frame
@@ -324,7 +345,7 @@ def _measure_frames(
                 result,
                 predicted_jac=_find_frame_jac(scores[0], frame.id) if scores else None,
                 box_iou=iou(item.truth, box)
-                if item.truth and box and has_every_box(frame)
+                if item.truth and box and has_boxes(frame, kinds)
                 else None,
             )
         )

@@ -257,7 +257,8 @@ def _suggest_drawing_or_hiding_markings(
             yield _SuggestionCandidate(
                 describe_condition(group, hide, max(fit.length_px, 1.0)), hide
             )
-    if camera is None:
+    if camera is None or view.media is None:
+        # Without a picture there is nothing to draw along.
         return
     fitted = group.pitch.with_goal_edge(solved.calibration.goal)
     seen = project_markings(camera, fitted, view.size)

@@ -457,4 +457,4 @@ def _format_change(before: float | None, after: float | None) -> str:
 def _format_offset(item: dict[str, Any]) -> str:
     if item["offset_frames"] is None:
         return ""
-    return f"{item['offset_frames']:+.3f} +- {item['offset_sigma_frames']:.3f}"
+    return f"{item['offset_frames']:+.3f} ± {item['offset_sigma_frames']:.3f}"

@@ -279,12 +279,12 @@ def describe_time_difference(proposal: RigProposal) -> str:
         pair, offset, sigma = min(known, key=lambda item: item[2])
         return (
             "no camera is ahead of another: the most certain pair, "
-            f"{pair.b} and {pair.a}, differs by {offset:+.3f} +- {sigma:.3f} frames"
+            f"{pair.b} and {pair.a}, differs by {offset:+.3f} ± {sigma:.3f} frames"
         )
     pair, offset, sigma = max(sure, key=lambda item: abs(item[1]))
     first, second = (pair.b, pair.a) if offset > 0 else (pair.a, pair.b)
     return (
-        f"{first} is {abs(offset):.2f} +- {sigma:.2f} frames ahead of {second}: its frame t shows "
+        f"{first} is {abs(offset):.2f} ± {sigma:.2f} frames ahead of {second}: its frame t shows "
         f"what {second} shows at t + {abs(offset):.2f}; times are not adjusted: check the "
         "frame offset"
     )

@@ -78,7 +78,9 @@ def add_predictions(
     first = files.first
     names = read_frame_names(store, dataset)
     boxes, cameras = read(files, names, ImportLimits.of(store.settings))
-    nothing = not boxes.detections and not cameras.cameras and not boxes.tracks
+    # Cameras do not make up for boxes none of whose frames is known.
+    kept = cameras.cameras and not boxes.unknown
+    nothing = not boxes.detections and not boxes.tracks and not kept
     if nothing and (boxes.unknown or cameras.unknown or boxes.report.problems):
         raise _unknown_frames_error(boxes, cameras, names)
     if boxes.tracks and not any(track.position for track in boxes.tracks.values()):

@@ -191,6 +191,23 @@ class TestBoxesTable:
         counts = {(cell.count, cell.of) for row in table.rows for cell in row.cells}
         assert len(table.rows) == 4 and counts == {(1, 2)}
 
+    def test_without_a_drawn_box_in_any_frame_the_other_kinds_are_compared(
+        self, make_frame
+    ) -> None:
+        """A dataset of points, as ISSIA's."""
+        frames = [make_frame(1), make_frame(2)]
+        reference = {frame.id: frame.boxes["exact"] for frame in frames}
+        frames = [
+            replace(frame, boxes={k: b for k, b in frame.boxes.items() if k != "annotated"})
+            for frame in frames
+        ]
+        table = make_boxes_table(frames, reference, {}, ONE_MATCH)
+        assert table.cell("exact", "iou").value == pytest.approx(1.0)
+        assert table.cell("annotated", "iou").value is None
+        assert "No frame has original boxes." in table.note
+        figure = make_boxes_figure(frames, reference, {1: 50.0, 2: 60.0})
+        assert [series.name for series in figure.panels[0].series] == ["optimized", "exact"]
+
     def test_every_number_says_of_how_many_careful_boxes_it_was_computed(self, make_frame) -> None:
         frames = [make_frame(1), make_frame(2), make_frame(3)]
         reference = dict.fromkeys((1, 2, 7, 8), frames[0].boxes["exact"])

@@ -8,6 +8,7 @@ from app.features.groups.suggestions import find_suggestions
 from app.soccer.annotation import BallAnnotation, make_lines
 from app.soccer.finding import Finding, SuggestedFix
 from app.soccer.frames import ImagePoint
+from app.soccer.group import Media
 from app.soccer.paint_evidence import PaintReading
 from app.soccer.pitch import Pitch
 from app.soccer.policy import PAPER
@@ -109,7 +110,7 @@ class TestFindRemedies:
         for marking in missing:
             del lines[marking]
         station = replace(good.views[1].station, lines=make_lines(lines))
-        bad = good.with_view(replace(good.views[1], station=station))
+        bad = good.with_view(replace(good.views[1], station=station, media=Media("b.jpg")))
         return bad, replace(PAPER, min_jac=clean - 0.01), missing
 
     def test_lines_that_nobody_drew_are_named_as_what_keeps_a_view_from_passing(self):
@@ -121,6 +122,12 @@ class TestFindRemedies:
         assert all(marking in best.sentence for marking in missing)
         assert "visible over" in best.sentence
         assert edit_of_fix(bad, best.fix) is None
+
+    def test_nothing_is_to_be_drawn_where_there_is_no_picture(self):
+        bad, policy, _ = self.undrawn()
+        bare = bad.with_view(replace(bad.views[1], media=None))
+        found = find_suggestions(bare, policy, solve_group(bare, policy))
+        assert "draw_marking" not in {remedy.fix.action for remedy in found}
 
     def lengths(self, bad, policy):
         """Of the markings of the second view that nobody drew, pixels at 960 x 540."""

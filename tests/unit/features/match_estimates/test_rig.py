@@ -109,14 +109,14 @@ class TestPropose:
         first, second = proposed.proposal.pairs[:2]
         # Small and sure, large and sure enough, larger and unsure.
         found = said((0.05, 0.001), (0.40, 0.08), (0.9, 0.5))
-        assert found.startswith(f"{second.b} is 0.40 +- 0.08 frames ahead of {second.a}")
+        assert found.startswith(f"{second.b} is 0.40 ± 0.08 frames ahead of {second.a}")
         assert f"what {second.a} shows at t + 0.40" in found
         found = said((-0.40, 0.08))
-        assert found.startswith(f"{first.a} is 0.40 +- 0.08 frames ahead of {first.b}")
+        assert found.startswith(f"{first.a} is 0.40 ± 0.08 frames ahead of {first.b}")
         # Not the mean: which of two comes first says nothing.
         none = said((0.05, 0.01), (-0.05, 0.02))
         assert none.startswith("no camera is ahead")
-        assert f"{first.b} and {first.a}, differs by +0.050 +- 0.010 frames" in none
+        assert f"{first.b} and {first.a}, differs by +0.050 ± 0.010 frames" in none
         assert said() == "too few moving balls to see whether a camera is ahead of another"
 
     def test_a_ball_that_was_put_where_others_see_it_says_nothing(self, store, fill) -> None:

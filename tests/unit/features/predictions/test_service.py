@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -67,6 +68,16 @@ class TestAddPredictions:
         files = PredictionFiles(None, cameras=tmp_path)
         found = add_predictions(store, "demo", "cams", files, actor="ann")
         assert (found.cameras, found.boxes, found.format) == (1, 0, "cameras")
+
+    def test_cameras_do_not_make_up_for_boxes_of_no_known_frame(
+        self, store, state, tmp_path, opposite
+    ) -> None:
+        cameras = tmp_path / "cameras"
+        cameras.mkdir()
+        (cameras / "camera_7.json").write_text(json.dumps(camera_to_json(opposite)))
+        files = replace(results(tmp_path / "yolo.json", "99.png"), cameras=cameras)
+        with pytest.raises(InputError, match="none of the 1 frames that could be read belongs"):
+            add_predictions(store, "demo", "x", files, actor="ann")
 
     def test_a_name_is_taken_once(self, store, state, tmp_path) -> None:
         files = results(tmp_path / "yolo.json", "7.png")
