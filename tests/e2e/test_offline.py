@@ -187,10 +187,11 @@ class TestOutbox:
         leave_as_found(page, [], edited=screen.group)
 
 
+BUSY = {"title": "Busy", "status": 503, "detail": "the database cannot be reached"}
+
+
 class TestArrival:
     """The database is away, or the session has ended: a group is read once more."""
-
-    BUSY = {"title": "Busy", "status": 503, "detail": "the database cannot be reached"}
 
     def test_a_group_that_could_not_be_read_is_shown_when_it_can(
         self, open_page: OpenPage, console: Any
@@ -198,9 +199,7 @@ class TestArrival:
         console.expect("503")
         page = open_page(None)
         group = int(rows(page)[0]["id"])
-        page.route(
-            f"**/api/v1/groups/{group}", lambda route: route.fulfill(status=503, json=self.BUSY)
-        )
+        page.route(f"**/api/v1/groups/{group}", lambda route: route.fulfill(status=503, json=BUSY))
         page.goto(f"/review/{group}")
         expect(page.get_by_role("heading", name=f"Group {group} cannot be shown")).to_be_visible()
         page.unroute(f"**/api/v1/groups/{group}")
@@ -218,7 +217,7 @@ class TestArrival:
 
         def refuse(route: Route) -> None:
             asked.append(route.request.url)
-            route.fulfill(status=503, json=self.BUSY)
+            route.fulfill(status=503, json=BUSY)
 
         page.route(f"**/api/v1/groups/{chain[1]}/neighbours**", refuse)
         page.route(f"**/api/v1/groups/{chain[1]}", refuse)
