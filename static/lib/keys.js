@@ -14,7 +14,7 @@ import { stored } from './storage.js';
  * @property {() => boolean} [when] otherwise the key is left to the browser
  * @property {{start: () => void, end: () => void}} [hold] what holding the key does; `run` is then
  *   the tap, and comes when the key is let go
- * @property {boolean} [once] a key held down does it once
+ * @property {boolean} [repeats] a key held down does it again and again; without it, once
  * @property {import('../api/people.js').Action} [needs] what somebody must be allowed to do
  */
 
@@ -138,6 +138,8 @@ function isSliding(event) {
 /** @param {KeyboardEvent} event */
 function dispatch(event) {
 	if (event.defaultPrevented || event.isComposing) return;
+	// A browser presses the button that has the focus again and again while Enter is down.
+	if (event.repeat && event.key === 'Enter' && isPress(event)) event.preventDefault();
 	if (document.querySelector('dialog[open], [popover]:popover-open:not([role="tooltip"])') || isPress(event) || isSliding(event)) return;
 	const chord = chordOf(event);
 	if (!lettersOn.value && isLetter(chord)) return;
@@ -151,7 +153,7 @@ function dispatch(event) {
 		event.preventDefault();
 		if (found.needs && refused(found.needs)) return;
 		if (found.hold) press(found, event);
-		else if (!event.repeat || !found.once) found.run(event);
+		else if (!event.repeat || found.repeats) found.run(event);
 		return;
 	}
 }

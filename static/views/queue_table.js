@@ -101,16 +101,16 @@ function openActive() {
 
 /** @type {import('../lib/keys.js').Binding[]} */
 const KEYS = [
-	{ keys: ['ArrowDown', 'j'], label: 'Next row', group: 'Queue', run: () => step(1) },
-	{ keys: ['ArrowUp', 'k'], label: 'Previous row', group: 'Queue', run: () => step(-1) },
-	{ keys: ['PageDown'], label: 'Ten rows down', group: 'Queue', run: () => step(10) },
-	{ keys: ['PageUp'], label: 'Ten rows up', group: 'Queue', run: () => step(-10) },
+	{ keys: ['ArrowDown', 'j'], label: 'Next row', group: 'Queue', repeats: true, run: () => step(1) },
+	{ keys: ['ArrowUp', 'k'], label: 'Previous row', group: 'Queue', repeats: true, run: () => step(-1) },
+	{ keys: ['PageDown'], label: 'Ten rows down', group: 'Queue', repeats: true, run: () => step(10) },
+	{ keys: ['PageUp'], label: 'Ten rows up', group: 'Queue', repeats: true, run: () => step(-10) },
 	{ keys: ['Home'], label: 'First row', group: 'Queue', run: () => step(-Infinity) },
 	{ keys: ['End'], label: 'Last row', group: 'Queue', run: () => step(Infinity) },
 	{ keys: ['Enter'], label: 'Open the row', group: 'Queue', run: openActive },
 	{ keys: [' '], label: 'Tick the row, or untick it', group: 'Queue', run: () => turnTick(activeRow.value) },
-	{ keys: ['Shift+ArrowDown'], label: 'Extend the ticks downwards', group: 'Queue', run: () => extend(1) },
-	{ keys: ['Shift+ArrowUp'], label: 'Extend the ticks upwards', group: 'Queue', run: () => extend(-1) },
+	{ keys: ['Shift+ArrowDown'], label: 'Extend the ticks downwards', group: 'Queue', repeats: true, run: () => extend(1) },
+	{ keys: ['Shift+ArrowUp'], label: 'Extend the ticks upwards', group: 'Queue', repeats: true, run: () => extend(-1) },
 ];
 
 /** First pixel in sight, as near as can be, with which a row is. @param {number} top @param {number} height @param {number} row */

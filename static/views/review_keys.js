@@ -197,7 +197,7 @@ function arrowKey(arrow, x, y) {
 	return {
 		keys: [`Arrow${arrow}`, `Shift+Arrow${arrow}`, `Alt+Arrow${arrow}`], group: 'Edit', needs: 'annotate',
 		label: `Move the selected object ${arrow.toLowerCase()}`, shown: 'hidden',
-		when: () => isDrawing() || isSelected(), run: (event) => (isDrawing() ? aim(x, y, event) : nudge(x, y, event)),
+		when: () => isDrawing() || isSelected(), repeats: true, run: (event) => (isDrawing() ? aim(x, y, event) : nudge(x, y, event)),
 	};
 }
 
@@ -214,15 +214,15 @@ const VERDICT = [
 
 /** @type {Binding[]} */
 const NAVIGATE = [
-	{ keys: ['f'], label: 'Next group', group: 'Navigate', run: () => { goNext(); } },
-	{ keys: ['d'], label: 'Previous group', group: 'Navigate', run: () => { goPrevious(); } },
-	{ keys: ['Shift+f'], label: 'Submit the group and go to the next one of the batch', group: 'Navigate', needs: 'annotate', once: true, when: () => canSubmit.value, run: () => { submitAndNext(); } },
+	{ keys: ['f'], label: 'Next group', group: 'Navigate', repeats: true, run: () => { goNext(); } },
+	{ keys: ['d'], label: 'Previous group', group: 'Navigate', repeats: true, run: () => { goPrevious(); } },
+	{ keys: ['Shift+f'], label: 'Submit the group and go to the next one of the batch', group: 'Navigate', needs: 'annotate', when: () => canSubmit.value, run: () => { submitAndNext(); } },
 	{ keys: ['Shift+u'], label: 'Return the group to its annotator, with a reason', group: 'Verdict', needs: 'review', when: () => canReturn.value, run: askReturn },
 	{ keys: ['Shift+r'], label: 'Apply an independent annotation to its group', group: 'Verdict', needs: 'lead', when: () => canTakeOver.value, run: askTakeOver },
-	{ keys: ['v'], label: 'Ten groups forward', group: 'Navigate', run: () => { goBy(1, FAR); } },
-	{ keys: ['c'], label: 'Ten groups back', group: 'Navigate', run: () => { goBy(-1, FAR); } },
-	{ keys: ['r'], label: 'Next group with a finding', group: 'Navigate', run: () => { goFlagged(1); } },
-	{ keys: ['e'], label: 'Previous group with a finding', group: 'Navigate', run: () => { goFlagged(-1); } },
+	{ keys: ['v'], label: 'Ten groups forward', group: 'Navigate', repeats: true, run: () => { goBy(1, FAR); } },
+	{ keys: ['c'], label: 'Ten groups back', group: 'Navigate', repeats: true, run: () => { goBy(-1, FAR); } },
+	{ keys: ['r'], label: 'Next group with a finding', group: 'Navigate', repeats: true, run: () => { goFlagged(1); } },
+	{ keys: ['e'], label: 'Previous group with a finding', group: 'Navigate', repeats: true, run: () => { goFlagged(-1); } },
 ];
 
 /** @type {Binding[]} */
@@ -266,8 +266,8 @@ const VIEW = [
 		},
 	},
 	{ keys: ['Shift+t'], label: 'History of the group: who changed what, with pictures', group: 'View', run: openHistory },
-	{ keys: [','], label: 'The focused view one frame before, where the dataset has it', group: 'View', run: () => { stepInstant(-1); } },
-	{ keys: ['.'], label: 'The focused view one frame after', group: 'View', run: () => { stepInstant(1); } },
+	{ keys: [','], label: 'The focused view one frame before, where the dataset has it', group: 'View', repeats: true, run: () => { stepInstant(-1); } },
+	{ keys: ['.'], label: 'The focused view one frame after', group: 'View', repeats: true, run: () => { stepInstant(1); } },
 	{ keys: ['t'], label: '3D point: pair average, or most likely point', group: 'View', run: otherEstimator },
 	{ keys: ['g'], label: 'Gates: thresholds and margins', group: 'View', run: showGates },
 	{
@@ -291,7 +291,7 @@ const EDIT = [
 		keys: [], label: 'Add a point on the line, at the click', group: 'Edit', shown: 'Alt click', run: () => {},
 	},
 	{
-		keys: ['Enter'], label: 'Apply the fix that the card on the right offers', group: 'Edit', needs: 'annotate', once: true,
+		keys: ['Enter'], label: 'Apply the fix that the card on the right offers', group: 'Edit', needs: 'annotate',
 		when: () => !editing.value && (suggestion.value !== null || isHeld.value), run: applySuggestion,
 	},
 	{
@@ -310,8 +310,8 @@ const EDIT = [
 		run: () => {},
 	},
 	arrowKey('Left', -1, 0), arrowKey('Right', 1, 0), arrowKey('Up', 0, -1), arrowKey('Down', 0, 1),
-	{ keys: ['['], label: 'Ball smaller by 0.25 px', group: 'Edit', needs: 'annotate', run: () => nudgeDiameter(-1) },
-	{ keys: [']'], label: 'Ball larger by 0.25 px', group: 'Edit', needs: 'annotate', run: () => nudgeDiameter(1) },
+	{ keys: ['['], label: 'Ball smaller by 0.25 px', group: 'Edit', needs: 'annotate', repeats: true, run: () => nudgeDiameter(-1) },
+	{ keys: [']'], label: 'Ball larger by 0.25 px', group: 'Edit', needs: 'annotate', repeats: true, run: () => nudgeDiameter(1) },
 	{
 		keys: ['Delete', 'Backspace'], label: 'Delete the selected object', group: 'Edit', needs: 'annotate',
 		run: deleteSelected,
@@ -324,8 +324,8 @@ const EDIT = [
 		keys: ['o'], label: 'Ball out of view, or not', group: 'Edit', needs: 'annotate',
 		run: () => changeBall(toggleOutOfView, ''),
 	},
-	{ keys: ['y'], label: 'Accept the predicted ball, or place it where the other views see it', group: 'Edit', needs: 'annotate', once: true, run: takeBall },
-	{ keys: ['Shift+q'], label: 'Follow the ball of the view through the groups before and after; press again to accept the result', group: 'Edit', needs: 'annotate', once: true, run: () => { followOrAccept(viewInHand()); } },
+	{ keys: ['y'], label: 'Accept the predicted ball, or place it where the other views see it', group: 'Edit', needs: 'annotate', run: takeBall },
+	{ keys: ['Shift+q'], label: 'Follow the ball of the view through the groups before and after; press again to accept the result', group: 'Edit', needs: 'annotate', run: () => { followOrAccept(viewInHand()); } },
 	{ keys: ['Shift+y'], label: 'Accept predictions in every view without a ball', group: 'Edit', needs: 'annotate', run: acceptAll },
 	{ keys: ['Shift+p'], label: 'Accept the lines that are proposed for the view', group: 'Edit', needs: 'annotate', run: acceptProposed },
 	{ keys: ['u'], label: 'Reset the selected line or ball to the imported one', group: 'Edit', needs: 'annotate', run: () => { revertSelected(); } },

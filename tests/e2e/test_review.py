@@ -474,6 +474,35 @@ class TestVerdicts:
         for group in chain[:3]:
             withdraw_verdict(page, group)
 
+    def test_a_key_that_is_held_down_gives_one_verdict(self, open_page: OpenPage) -> None:
+        page = open_page(None)
+        chain = [row["id"] for row in rows(page)][-4:]
+        page.goto(f"/review/{chain[0]}")
+        screen = Screen(page)
+        screen.ready()
+        lie_ready(page, chain)
+        for key in ("s", "x"):
+            # A key that is down already repeats.
+            for _ in range(4):
+                page.keyboard.down(key)
+            page.keyboard.up(key)
+        expect(page.locator(".reasons")).to_be_visible()
+        for _ in range(4):
+            page.keyboard.down("1")
+        page.keyboard.up("1")
+        page.wait_for_url(f"**/review/{chain[2]}")
+        page.get_by_role("button", name="Defer").focus()
+        for _ in range(4):
+            page.keyboard.down("Enter")
+        page.keyboard.up("Enter")
+        page.wait_for_url(f"**/review/{chain[3]}")
+        screen.saved()
+        verdicts = {row["id"]: row["status"] for row in rows(page)}
+        said = [verdicts[group] for group in chain]
+        assert said == ["deferred", "rejected", "deferred", "unreviewed"]
+        for group in chain[:3]:
+            withdraw_verdict(page, group)
+
     def test_a_failing_group_is_accepted_only_with_a_reason(self, open_page: OpenPage) -> None:
         page = open_page(None)
         failing = next(row["id"] for row in rows(page) if not row["passes"])

@@ -1,4 +1,5 @@
 import assert from 'node:assert/strict';
+import { readdirSync, readFileSync } from 'node:fs';
 import { describe, it } from 'node:test';
 
 import { bind, chooseKey, chordOf, isEditable, isLetter, keysOf, startKeys } from '../../static/lib/keys.js';
@@ -66,5 +67,31 @@ describe('a key', () => {
 		}
 		assert.equal(runs, 1);
 		unbind();
+	});
+
+	it('does it once however long it is held, except where it repeats', () => {
+		/** @type {string[]} */
+		const done = [];
+		const binding = (/** @type {string} */ key, /** @type {boolean} */ repeats) => ({ keys: [key], label: key, group: 'Track', repeats, run: () => done.push(key) });
+		const unbind = bind([binding('a', false), binding('f', true)]);
+		startKeys();
+		for (const key of ['a', 'f']) for (const repeat of [false, true, true]) hears.keydown({ ...event, key, code: key, repeat, target: new HTMLElement('DIV'), preventDefault: () => {} });
+		assert.deepEqual(done, ['a', 'f', 'f', 'f']);
+		unbind();
+	});
+
+	it('presses a button that has the focus once', () => {
+		let prevented = 0;
+		for (const repeat of [false, true, true]) hears.keydown({ ...event, key: 'Enter', code: 'Enter', repeat, target: new HTMLButtonElement('BUTTON'), preventDefault: () => { prevented += 1; } });
+		assert.equal(prevented, 2);
+	});
+
+	it('repeats only steps and moves, and never what is said of a group or a track', () => {
+		const views = new URL('../../static/views/', import.meta.url);
+		const files = readdirSync(views, { recursive: true }).filter((name) => name.endsWith('.js'));
+		const repeating = files.flatMap((name) => readFileSync(new URL(name, views), 'utf8').split('\n').filter((line) => line.includes('repeats: true')));
+		assert.ok(repeating.length > 40);
+		const kinds = /label: ['`](?:Next|Previous|Ten|One second|Extend|Move|Show (?:fewer|more)|Closer|Farther|Ball (?:smaller|larger)|The focused view one frame)|when: (?:turns|notScrolling|\(\) => isDrawing)/;
+		assert.deepEqual(repeating.filter((line) => !kinds.test(line) || /judge|'review'|'lead'/.test(line)), []);
 	});
 });

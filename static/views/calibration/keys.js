@@ -67,7 +67,7 @@ const notScrolling = () => hasPoint() && !document.activeElement?.closest('.edit
 function arrow(name, x, y) {
 	return {
 		keys: [`Arrow${name}`, `Shift+Arrow${name}`, `Alt+Arrow${name}`], group: 'Edit', shown: 'hidden',
-		label: `Move the point ${name.toLowerCase()}`, when: notScrolling,
+		label: `Move the point ${name.toLowerCase()}`, when: notScrolling, repeats: true,
 		run: ({ shiftKey, altKey }) => {
 			const step = altKey ? 0.1 : shiftKey ? 5 : 1;
 			nudgePoint(x * step, y * step);
@@ -89,10 +89,10 @@ export const EDITOR_KEYS = [
 	{ keys: ['Shift+Delete', 'Shift+Backspace'], label: 'Delete the marking', group: 'Edit', run: deleteMarking },
 	{ keys: [], label: 'Move by 1 px; Shift 5 px; Alt 0.1 px', group: 'Edit', shown: '← ↑ → ↓', run: () => {} },
 	arrow('Left', -1, 0), arrow('Right', 1, 0), arrow('Up', 0, -1), arrow('Down', 0, 1),
-	{ keys: ['.'], label: 'Next point', group: 'Choose', run: () => stepPoint(1) },
-	{ keys: [','], label: 'Previous point', group: 'Choose', run: () => stepPoint(-1) },
-	{ keys: [']'], label: 'Next marking', group: 'Choose', run: () => stepMarking(1) },
-	{ keys: ['['], label: 'Previous marking', group: 'Choose', run: () => stepMarking(-1) },
+	{ keys: ['.'], label: 'Next point', group: 'Choose', repeats: true, run: () => stepPoint(1) },
+	{ keys: [','], label: 'Previous point', group: 'Choose', repeats: true, run: () => stepPoint(-1) },
+	{ keys: [']'], label: 'Next marking', group: 'Choose', repeats: true, run: () => stepMarking(1) },
+	{ keys: ['['], label: 'Previous marking', group: 'Choose', repeats: true, run: () => stepMarking(-1) },
 	...['1', '2', '3', '4', '5', '6'].map((digit, i) => ({
 		keys: [digit], label: 'Another view', group: 'Choose', shown: i === 0 ? '1 … 6' : 'hidden', run: () => goToView(i),
 	})),

@@ -25,10 +25,10 @@ function zoomIn() {
 
 /** @type {Binding[]} */
 const KEYS = [
-	{ keys: ['ArrowRight'], label: 'Next view', group: 'Compare', run: () => stepView(1) },
-	{ keys: ['ArrowLeft'], label: 'Previous view', group: 'Compare', run: () => stepView(-1) },
-	{ keys: ['n'], label: 'Next difference', group: 'Compare', run: () => stepDifference(1) },
-	{ keys: ['Shift+n'], label: 'Previous difference', group: 'Compare', run: () => stepDifference(-1) },
+	{ keys: ['ArrowRight'], label: 'Next view', group: 'Compare', repeats: true, run: () => stepView(1) },
+	{ keys: ['ArrowLeft'], label: 'Previous view', group: 'Compare', repeats: true, run: () => stepView(-1) },
+	{ keys: ['n'], label: 'Next difference', group: 'Compare', repeats: true, run: () => stepDifference(1) },
+	{ keys: ['Shift+n'], label: 'Previous difference', group: 'Compare', repeats: true, run: () => stepDifference(-1) },
 	{ keys: ['o'], label: 'Show or hide the other person’s annotation (dashed)', group: 'View', run: () => { others.value = !others.value; announce(`The other person’s annotation is ${others.value ? 'shown' : 'hidden'}.`); } },
 	{ keys: ['h'], label: 'Hide or show all overlays', group: 'View', run: () => { overlaysHidden.value = !overlaysHidden.value; } },
 	{ keys: ['p'], label: 'Projected lines', group: 'View', run: () => { projections.value = !projections.value; } },

@@ -50,8 +50,8 @@ function move(step) {
 
 /** @type {import('../../lib/keys.js').Binding[]} */
 const KEYS = [
-	{ keys: ['ArrowDown'], label: 'Next entry', group: 'History', run: () => move(1) },
-	{ keys: ['ArrowUp'], label: 'Previous entry', group: 'History', run: () => move(-1) },
+	{ keys: ['ArrowDown'], label: 'Next entry', group: 'History', repeats: true, run: () => move(1) },
+	{ keys: ['ArrowUp'], label: 'Previous entry', group: 'History', repeats: true, run: () => move(-1) },
 	{ keys: ['Escape'], label: 'Back to the group', group: 'History', run: () => { const at = page.value; if ('group' in at && at.group) navigate(reviewAddress(at.group)); } },
 ];
 

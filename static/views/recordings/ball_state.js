@@ -157,7 +157,7 @@ function crossKeys(latest) {
 	const ways = /** @type {const} */ ([['ArrowLeft', -1, 0], ['ArrowRight', 1, 0], ['ArrowUp', 0, -1], ['ArrowDown', 0, 1]]);
 	return [
 		...ways.map(([key, x, y]) => /** @type {Binding} */ ({
-			keys: [key, `Shift+${key}`, `Alt+${key}`], label: `Move the cross ${key.slice(5).toLowerCase()}; with Shift further, with Alt by one pixel`, group: 'Ball, with the cross', shown: written(key), when, run: (event) => latest.current.moveCross(x, y, event),
+			keys: [key, `Shift+${key}`, `Alt+${key}`], label: `Move the cross ${key.slice(5).toLowerCase()}; with Shift further, with Alt by one pixel`, group: 'Ball, with the cross', shown: written(key), when, repeats: true, run: (event) => latest.current.moveCross(x, y, event),
 		})),
 		{ keys: ['Enter'], label: 'Follow the ball from the cross', group: 'Ball, with the cross', when, run: () => { const { cross, click } = latest.current; if (cross) click(cross); } },
 		{ keys: ['Escape'], label: 'Hide the cross', group: 'Ball, with the cross', when, run: () => latest.current.turnCross() },

@@ -34,12 +34,12 @@ export function sceneKeys(stage, { turns, leave, digits } = REVIEW) {
 	/** @param {string} arrow @param {number} azimuth @param {number} elevation @returns {Binding} */
 	const arrow = (arrow, azimuth, elevation) => ({
 		keys: [`Arrow${arrow}`], label: 'Turn the scene', group: '3D', shown: arrow === 'Left' ? '← ↑ → ↓' : 'hidden',
-		when: turns, run: turn((orbit) => turned(orbit, azimuth, elevation)),
+		when: turns, repeats: true, run: turn((orbit) => turned(orbit, azimuth, elevation)),
 	});
 	return [
 		arrow('Left', -STEP, 0), arrow('Right', STEP, 0), arrow('Up', 0, STEP), arrow('Down', 0, -STEP),
-		{ keys: ['+', '='], label: 'Closer', group: '3D', shown: '+', run: turn((orbit) => approached(orbit, 0.85)) },
-		{ keys: ['-'], label: 'Farther', group: '3D', run: turn((orbit) => approached(orbit, 1 / 0.85)) },
+		{ keys: ['+', '='], label: 'Closer', group: '3D', shown: '+', repeats: true, run: turn((orbit) => approached(orbit, 0.85)) },
+		{ keys: ['-'], label: 'Farther', group: '3D', repeats: true, run: turn((orbit) => approached(orbit, 1 / 0.85)) },
 		{ keys: ['0'], label: 'Whole scene', group: '3D', run: () => goToPreset('whole') },
 		{ keys: ['7'], label: 'From above', group: '3D', run: () => goToPreset('top') },
 		{ keys: ['8'], label: 'From the side', group: '3D', run: () => goToPreset('side') },

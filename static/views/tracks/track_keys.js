@@ -44,20 +44,20 @@ export function keysOfTrack(doing) {
 		{ keys: [','], label: 'Play more slowly', group: look, run: () => doing.current.player.changePace(-1) },
 		{ keys: ['.'], label: 'Play faster', group: look, run: () => doing.current.player.changePace(1) },
 		{ keys: ['\\'], label: '3D and top view, or the curves', group: look, run: () => doing.current.switchView() },
-		{ keys: ['ArrowRight'], label: 'Next frame', group: look, run: () => stepBy(1) },
-		{ keys: ['ArrowLeft'], label: 'Previous frame', group: look, run: () => stepBy(-1) },
-		{ keys: ['Shift+ArrowRight'], label: 'One second forward', group: look, run: () => stepBy(second()) },
-		{ keys: ['Shift+ArrowLeft'], label: 'One second back', group: look, run: () => stepBy(-second()) },
-		{ keys: ['n'], label: 'Next event', group: look, run: () => toEvent(1) },
-		{ keys: ['p'], label: 'Previous event', group: look, run: () => toEvent(-1) },
+		{ keys: ['ArrowRight'], label: 'Next frame', group: look, repeats: true, run: () => stepBy(1) },
+		{ keys: ['ArrowLeft'], label: 'Previous frame', group: look, repeats: true, run: () => stepBy(-1) },
+		{ keys: ['Shift+ArrowRight'], label: 'One second forward', group: look, repeats: true, run: () => stepBy(second()) },
+		{ keys: ['Shift+ArrowLeft'], label: 'One second back', group: look, repeats: true, run: () => stepBy(-second()) },
+		{ keys: ['n'], label: 'Next event', group: look, repeats: true, run: () => toEvent(1) },
+		{ keys: ['p'], label: 'Previous event', group: look, repeats: true, run: () => toEvent(-1) },
 		{ keys: ['w'], label: 'Worst frame: the largest left-out error', group: look, run: () => { const { worst } = doing.current.track.summary; if (worst !== null) goTo(worst); } },
 		{ keys: ['c'], label: 'Next frame with a ball that contradicts the track', group: look, run: () => {
 			const { frames, at } = doing.current;
 			const frame = contradictedAfter(frames?.contradicted ?? [], at);
 			if (frame !== undefined) goTo(frame);
 		} },
-		{ keys: ['+', '='], label: 'Show fewer frames', group: look, shown: '+', run: () => doing.current.zoom(0.5) },
-		{ keys: ['-'], label: 'Show more frames', group: look, run: () => doing.current.zoom(2) },
+		{ keys: ['+', '='], label: 'Show fewer frames', group: look, shown: '+', repeats: true, run: () => doing.current.zoom(0.5) },
+		{ keys: ['-'], label: 'Show more frames', group: look, repeats: true, run: () => doing.current.zoom(2) },
 		{ keys: ['Enter'], label: 'Open the group of this frame', group: look, run: () => {
 			const { frames, track, at } = doing.current;
 			const group = frames?.group[at - track.first];
