@@ -106,6 +106,7 @@ let wanted = 0;
 
 /** Show what is known of a group, at once; nothing asked or selected stays. @param {number} id */
 function turnTo(id) {
+	settle();
 	wanted = id;
 	resetForGroup();
 	show(known(id) ?? null);

@@ -5,7 +5,7 @@ import { computed } from '@preact/signals';
 
 import { navigate, page } from '../lib/router.js';
 import { dataset } from './datasets.js';
-import { groupDocument, lastStationOf, open, pending, submitTurn } from './group.js';
+import { groupDocument, lastStationOf, open, pending, settle, submitTurn } from './group.js';
 import { actions, didAgain, forget, forgetEdit, nextAgain, nextBack, tookBack, undone } from './last_action.js';
 import { returnTo, reviewAddress } from './navigation.js';
 import { announce, complain, explain } from './notice.js';
@@ -41,7 +41,8 @@ export const undoable = computed(() => {
 	if (action.kind === 'dismissal') return `${action.dismissed ? 'Reopen the finding' : 'Dismiss the finding again'} in group ${action.number}`;
 	return `Undo the verdict on group ${action.number}`;
 });
-const canRedoHere = computed(() => Boolean(groupDocument.value?.can_redo) || ownStation.value !== null);
+// A new edit leaves nothing to redo, though the server has not answered it yet.
+const canRedoHere = computed(() => pending.value.length === 0 && (Boolean(groupDocument.value?.can_redo) || ownStation.value !== null));
 /** What redo would do again, in words; null when there is nothing. */
 export const redoable = computed(() => {
 	const action = nextAgain(undone.value, here.value);
@@ -57,6 +58,7 @@ let turn = Promise.resolve();
 
 /** Take back what this window did last, wherever that was, else the last edit of this group, whoever made it. */
 export function undo() {
+	settle();
 	turn = turn.then(undoOne, undoOne);
 }
 
@@ -105,6 +107,7 @@ async function undoThere(action) {
 
 /** Do again what was taken back last, wherever that was, else the last undone edit of this group. */
 export function redo() {
+	settle();
 	turn = turn.then(redoOne, redoOne);
 }
 

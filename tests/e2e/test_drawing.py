@@ -18,6 +18,11 @@ def first_view(screen: Screen) -> Document:
     return view
 
 
+def balls(screen: Screen) -> list[Document]:
+    """The balls of all views, as the server has them."""
+    return [view["balls"] for view in screen.document()["views"]]
+
+
 def undo(screen: Screen, before: Document) -> None:
     """Take edits back until the view is what it was."""
     screen.saved()
@@ -155,6 +160,39 @@ class TestObjects:
         screen.press("u")
         expect(screen.page.locator(".save")).to_have_attribute("data-unsaved", "0")
         until(screen.page, lambda: first_view(screen)["balls"] == before["balls"])
+
+    def test_undo_takes_back_a_nudge_that_is_not_sent_yet(self, review: Review) -> None:
+        screen = review(1)
+        before = first_view(screen)
+        screen.press("q")
+        screen.saved()
+        occluded = first_view(screen)["balls"]
+        screen.press("i", "Shift+ArrowRight", "Control+z")
+        screen.saved()
+        assert first_view(screen)["balls"] == occluded
+        screen.press("Control+Shift+z")
+        until(screen.page, lambda: first_view(screen)["balls"] != occluded)
+        undo(screen, before)
+
+    def test_a_nudge_is_saved_when_the_browser_goes_back_at_once(self, review: Review) -> None:
+        screen = review(1)
+        group, before = screen.group, balls(screen)
+        expect(screen.page.locator(".header__place")).to_contain_text("of")
+        screen.press("f")
+        screen.page.wait_for_url(lambda url: f"/review/{group}" not in url)
+        screen.ready()
+        screen.press("d")
+        screen.page.wait_for_url(f"**/review/{group}*")
+        screen.ready()
+        screen.press("i", "Shift+ArrowRight")
+        screen.page.evaluate("() => history.back()")
+        screen.page.wait_for_url(lambda url: f"/review/{group}" not in url)
+        screen.saved()
+        screen.page.go_back()
+        screen.ready()
+        assert balls(screen) != before
+        screen.press("Control+z")
+        until(screen.page, lambda: balls(screen) == before)
 
     def test_undo_goes_across_views_and_survives_a_reload(self, review: Review) -> None:
         screen = review(1)
