@@ -18,6 +18,7 @@ import { startMaintenance } from './state/maintenance.js';
 import { startSuggestions } from './state/suggestions.js';
 import { lasting, outbox } from './state/outbox.js';
 import { startNotifications } from './state/notifications.js';
+import { changesOf, stagings } from './state/staging.js';
 import { startThreads } from './state/threads.js';
 import { startSending } from './state/sending.js';
 import { refuses } from './state/rights.js';
@@ -25,8 +26,9 @@ import { App } from './views/app.js';
 import { datasetHere, startNeeds } from './views/needs.js';
 
 addEventListener('beforeunload', (event) => {
-	// What is in the outbox comes back with the page; what is in hand does not.
-	if (draft.value || (!lasting.value && outbox.value.length > 0)) event.preventDefault();
+	// What is in the outbox comes back with the page; what is in hand or staged does not.
+	const isStaged = Object.values(stagings.value).some((one) => Object.keys(changesOf(one)).length > 0);
+	if (draft.value || isStaged || (!lasting.value && outbox.value.length > 0)) event.preventDefault();
 });
 
 /** What asks the server by itself. */

@@ -7,7 +7,6 @@ import * as client from '../api/client.js';
 import { ApiError } from '../api/problem.js';
 import { latest } from '../lib/latest.js';
 import { page, param } from '../lib/router.js';
-import { stored } from '../lib/storage.js';
 import { known, load } from './documents.js';
 import { applyEdit } from './edits.js';
 import { group, groupDocument, onLost, solution, submit } from './group.js';
@@ -16,7 +15,7 @@ import { sameLines } from './line_changes.js';
 import { announce, explain } from './notice.js';
 import { refuses } from './rights.js';
 import { asProposed } from './proposal_lines.js';
-import { begin, changesOf, linesOf, overlapOf, proposedLines, rebase, stage, stageEdit, stepBack, stepForward } from './staging.js';
+import { begin, changesOf, linesOf, overlapOf, proposedLines, rebase, stage, stageEdit, stagings, stepBack, stepForward } from './staging.js';
 
 /** @import {GroupDocument, LinesJson, SolutionJson} from '../api/types.js' */
 /** @import {Item} from './outbox.js' */
@@ -40,9 +39,6 @@ export const hovered = signal(/** @type {string | null} */ (null));
 export const mode = signal(/** @type {Mode} */ ('select'));
 /** The lines while something is dragged. */
 export const held = signal(/** @type {LinesJson | null} */ (null));
-
-/** Staged edits by station; they survive a reload of the tab. */
-const stagings = stored('staged-lines', /** @type {Record<string, Staging>} */ ({}), 'sessionStorage');
 
 export const staging = computed(() => {
 	const at = view.value;

@@ -1,9 +1,10 @@
 // @ts-check
 /** Staged edits: steps away from what is saved, taken back and made again before anything is sent. */
 
+import { stored } from '../lib/storage.js';
 import { changesBetween, sameLines } from './line_changes.js';
 
-/** @import {LinesJson, PointJson} from '../api/types.js' */
+/** @import {GroupDocument, LinesJson, PointJson} from '../api/types.js' */
 /** @import {LinesEdit} from './edits.js' */
 
 /** @typedef {{readonly lines: LinesJson, readonly label: string, readonly run: string}} Step */
@@ -13,6 +14,18 @@ import { changesBetween, sameLines } from './line_changes.js';
  * @property {Step[]} steps what was done, also what was taken back since
  * @property {number} at how many steps are in force
  */
+
+/** Staged edits by station; they survive a reload of the tab. */
+export const stagings = stored('staged-lines', /** @type {Record<string, Staging>} */ ({}), 'sessionStorage');
+
+/** The markings of a group that are staged and not saved, and the first view that has some. @param {GroupDocument} group */
+export function stagedIn({ views }) {
+	const staged = views.flatMap(({ key, station, lines }) => {
+		const kept = stagings.value[station.id];
+		return kept ? Object.keys(changesOf(rebase(kept, lines))).map(() => key) : [];
+	});
+	return { count: staged.length, view: staged.at(0) };
+}
 
 /** @param {LinesJson} base @returns {Staging} */
 export function begin(base) {

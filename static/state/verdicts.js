@@ -15,6 +15,7 @@ import { announce, complain, explain, inform } from './notice.js';
 import { outbox } from './outbox.js';
 import { reasonText } from './reasons.js';
 import { refuses } from './rights.js';
+import { stagedIn } from './staging.js';
 import { asking, focused } from './workspace.js';
 
 /** @import {VerdictDone} from './last_action.js' */
@@ -36,7 +37,13 @@ export function accept() {
 		return;
 	}
 	if (!group.solution.passes || isBlind(group) || doubt(group.solution)) asking.value = 'override';
-	else decide('accepted', null, null);
+	else if (stagedIn(group).count > 0) asking.value = 'staged';
+	else acceptAsSaved();
+}
+
+/** Accept the group as it is saved. */
+export function acceptAsSaved() {
+	decide('accepted', null, null);
 }
 
 /** Ask for the reason to reject. */

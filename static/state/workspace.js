@@ -19,7 +19,7 @@ export const maximised = signal(/** @type {string | null} */ (null));
 /** The object that keys move. */
 export const selected = signal(/** @type {Selection | null} */ (null));
 /** What the person is asked before a verdict can be given; null when nothing. */
-export const asking = signal(/** @type {null | 'reason' | 'view' | 'viewNote' | 'note' | 'override' | 'swap'} */ (null));
+export const asking = signal(/** @type {null | 'reason' | 'view' | 'viewNote' | 'note' | 'override' | 'staged' | 'swap'} */ (null));
 /** Whether Tab walks through the objects of the focused view. */
 export const editing = signal(false);
 

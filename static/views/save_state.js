@@ -4,13 +4,16 @@
 import { html } from 'htm/preact';
 import { useEffect, useState } from 'preact/hooks';
 
-import { ago } from '../lib/format.js';
+import { ago, plural } from '../lib/format.js';
 import { useNow } from '../lib/hooks.js';
+import { page } from '../lib/router.js';
 import { held } from '../state/conflict.js';
+import { editorAddress } from '../state/editor_address.js';
 import { groupDocument, unsaved } from '../state/group.js';
 import { changedElsewhere } from '../state/live.js';
 import { reviewAddress } from '../state/navigation.js';
 import { lasting } from '../state/outbox.js';
+import { stagedIn } from '../state/staging.js';
 import { busyWith, isAway, isSending, savedAt, waiting, wake, wasRefused } from '../state/sending.js';
 
 /** Saving is worth a word only when it takes long enough to wonder. */
@@ -46,6 +49,14 @@ function ConflictLink({ shown }) {
 	return html`<a class="save__conflict" href=${reviewAddress(other.group)} title="Opens the group with your unsaved changes">Go to the conflict</a>`;
 }
 
+/** The way to what is staged in the calibration editor and not saved. */
+function StagedLink() {
+	const group = groupDocument.value;
+	const { count, view } = group ? stagedIn(group) : { count: 0 };
+	if (!group || !view || page.value.page !== 'review') return null;
+	return html`<a class="save__conflict" href=${editorAddress(group.id, view)}>${plural(count, 'marking')} staged, not saved – open the editor</a>`;
+}
+
 /** @param {{elsewhere?: boolean}} props `elsewhere`: no group is on screen, so that only what is not saved is worth a word */
 export function SaveState({ elsewhere = false }) {
 	const now = useNow(1000);
@@ -63,6 +74,7 @@ export function SaveState({ elsewhere = false }) {
 		? `Stored in this browser, and sent when the server ${busyWith.value ? `has time. It says: ${busyWith.value}` : 'can be reached'}`
 		: 'This browser cannot store unsaved changes: do not close the page';
 	return html`
+		<${StagedLink} />
 		<${ConflictLink} shown=${elsewhere ? undefined : groupDocument.value?.id} />
 		<span class="save" data-state=${quick ? 'saved' : state} data-unsaved=${unsaved.value} title=${title}>
 			<span class="save__dot" aria-hidden="true"></span>${text}

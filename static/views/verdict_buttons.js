@@ -4,13 +4,17 @@
 import { html } from 'htm/preact';
 import { useLayoutEffect, useMemo, useRef } from 'preact/hooks';
 
+import { plural } from '../lib/format.js';
 import { useKeys } from '../lib/hooks.js';
+import { navigate } from '../lib/router.js';
 import { doubt, suggestedReason } from '../state/advice.js';
+import { editorAddress } from '../state/editor_address.js';
 import { frozen } from '../state/return_group.js';
 import { REASONS } from '../state/reasons.js';
 import {
-	accept, answer, askReason, cancelAsking, defer, isBlind, lastReason, reject, rejectView, rejectViewBecause,
+	accept, acceptAsSaved, answer, askReason, cancelAsking, defer, isBlind, lastReason, reject, rejectView, rejectViewBecause,
 } from '../state/verdicts.js';
+import { stagedIn } from '../state/staging.js';
 import { asking } from '../state/workspace.js';
 import { SubmitButton } from './lease_bar.js';
 import { SwapAsk } from './swap_ask.js';
@@ -92,12 +96,34 @@ function NoteForm({ title, button, onNote = answer }) {
 	`;
 }
 
+/** Before a group is accepted without what is staged in the calibration editor. @param {{group: GroupDocument}} props */
+function StagedAsk({ group }) {
+	const { count, view } = stagedIn(group);
+	const open = () => navigate(editorAddress(group.id, view ?? ''));
+	useKeys(useMemo(() => [
+		{ keys: ['Enter'], label: 'Open the calibration editor', group: 'Verdict', run: open },
+		{ keys: ['m'], label: 'Accept without what is staged', group: 'Verdict', run: acceptAsSaved },
+	], [group.id, view]));
+	const title = `${plural(count, 'marking')} staged in the calibration editor, not saved. Accept the group without ${count === 1 ? 'it' : 'them'}?`;
+	return html`
+		<section class="ask" aria-label=${title}>
+			<p class="ask__title">${title} <kbd>Esc</kbd></p>
+			<p class="ask__buttons">
+				<button class="button button--primary" type="button" onClick=${open}>Open the editor <kbd>Enter</kbd></button>
+				<button class="button" type="button" onClick=${acceptAsSaved}>Accept anyway <kbd>M</kbd></button>
+			</p>
+		</section>
+	`;
+}
+
 /** What speaks against accepting a group. @param {GroupDocument} group */
 function acceptTitle(group) {
 	const failing = group.solution?.first_failing;
+	const staged = stagedIn(group).count;
 	const reasons = [
 		group.solution?.passes ? '' : failing ? `a gate fails (${failing.sentence})` : 'a gate fails',
 		isBlind(group) ? 'no view has a picture to look at' : '',
+		staged ? `${plural(staged, 'marking')} ${staged === 1 ? 'is' : 'are'} staged and not saved` : '',
 		doubt(group.solution)?.replace(/\.$/, '') ?? '',
 	].filter(Boolean);
 	return `Accept although ${reasons.join(' and ')}? Say why.`;
@@ -109,6 +135,7 @@ function Ask({ group }) {
 	if (asking.value === 'view') return html`<${ReasonList} key="view" ...${VIEW_REASONS} />`;
 	if (asking.value === 'viewNote') return html`<${NoteForm} title="Why is this view left out?" button="Leave out" onNote=${rejectViewBecause} />`;
 	if (asking.value === 'note') return html`<${NoteForm} title="What is wrong with this group?" button="Reject" />`;
+	if (asking.value === 'staged') return html`<${StagedAsk} group=${group} />`;
 	if (asking.value === 'swap') return html`<${SwapAsk} group=${group} />`;
 	if (asking.value !== 'override') return null;
 	return html`<${NoteForm} title=${acceptTitle(group)} button="Accept" />`;

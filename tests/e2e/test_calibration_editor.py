@@ -196,6 +196,26 @@ class TestStaging:
         until(editor.page, lambda: editor.drawn() == whole)
         assert editor.lines == before
 
+    def test_what_is_staged_is_told_in_the_review_and_asked_about_before_accepting(
+        self, editor: Editor
+    ) -> None:
+        page = editor.page
+        page.on("dialog", lambda dialog: dialog.accept())
+        editor.choose(longest(editor.lines))
+        editor.press(".", "Delete")
+        editor.staged(1)
+        editor.press("Escape", "Escape")
+        page.wait_for_url(f"**/review/{editor.group}")
+        link = page.get_by_role("link", name="1 marking staged, not saved – open the editor")
+        expect(link).to_be_visible()
+        editor.press("a")
+        asked = page.get_by_role("region", name="1 marking staged in the calibration editor")
+        expect(asked).to_be_visible()
+        expect(page).to_have_url(re.compile(f"/review/{editor.group}$"))
+        with page.expect_event("dialog") as asks:
+            page.reload()
+        assert asks.value.type == "beforeunload"
+
     def test_undo_is_offered_once_there_is_something_to_undo(
         self, open_page: OpenPage, server: str
     ) -> None:
