@@ -8,10 +8,10 @@ import { groupDocument, submit, submitDismissal, submitVerdict } from './group.j
 import { announce } from './notice.js';
 import { discard, outbox } from './outbox.js';
 
-/** @import {GroupDocument, PointJson} from '../api/types.js' */
+/** @import {GroupDocument, PointJson, ViewJson} from '../api/types.js' */
 /** @import {BallEdit, Edit, LinesEdit} from './edits.js' */
 /** @import {FindingName} from './last_action.js' */
-/** @import {Item, Verdict} from './outbox.js' */
+/** @import {Base, Item, Verdict} from './outbox.js' */
 
 /**
  * @typedef {object} Field one thing that both could have changed
@@ -23,6 +23,7 @@ import { discard, outbox } from './outbox.js';
  * @property {unknown} mine
  * @property {unknown} theirs as it is now
  * @property {boolean} overlaps whether they changed it too, to something else
+ * @property {boolean} [unchanged] I changed nothing of it, only they did
  * @property {Edit | null} edit that makes mine of theirs
  * @property {Verdict | null} verdict
  */
@@ -51,9 +52,27 @@ export function conflictOf(theirs, own) {
 			fields.set(field.key, { ...field, base, overlaps: overlap(base, field.mine, field.theirs) });
 		}
 	}
-	const all = [...fields.values()];
-	const apart = all.filter(({ overlaps }) => !overlaps).length;
-	return { fields: all, mergeable: apart > 0 && apart < all.length };
+	const mine = [...fields.values()];
+	const apart = mine.filter(({ overlaps }) => !overlaps).length;
+	const base = own.find(({ base }) => base?.views)?.base?.views ?? {};
+	const others = theirs.views.flatMap((view) => (base[view.key] ? theirChanges(view, base[view.key]) : []));
+	return {
+		fields: [...mine, ...others.filter(({ key }) => !fields.has(key))], mergeable: apart > 0 && apart < mine.length,
+	};
+}
+
+/** What they changed of a view that a verdict had found otherwise. @param {ViewJson} view @param {Base} base @returns {Field[]} */
+function theirChanges(view, base) {
+	const markings = [...new Set([base, view].flatMap(({ lines, not_visible = [] }) => [...Object.keys(lines), ...not_visible]))];
+	const edits = /** @type {Edit[]} */ ([
+		{ kind: 'include', view: view.key, included: base.included, reason: base.left_out?.reason, note: base.left_out?.note },
+		{ kind: 'ball', view: view.key, ball: base.balls[0] ?? null },
+		{ kind: 'picture', view: view.key, picture: base.picture ?? null },
+		{ kind: 'lines', view: view.key, lines: Object.fromEntries(markings.map((marking) => [marking, base.lines[marking] ?? null])), notVisible: base.not_visible },
+	]);
+	return edits.flatMap((edit) => editFields(view, edit, base))
+		.filter((field) => !same(field.base, field.theirs))
+		.map((field) => ({ ...field, edit: null, unchanged: true, mine: field.base }));
 }
 
 /** @param {GroupDocument} theirs @param {Item} item @returns {Field[]} */
@@ -66,7 +85,11 @@ function fieldsOf(theirs, { edit, verdict, base }) {
 		}];
 	}
 	if (!edit || !theirs.views.some(({ key }) => key === edit.view)) return [];
-	const view = viewOf(theirs, edit.view);
+	return editFields(viewOf(theirs, edit.view), edit, base);
+}
+
+/** @param {ViewJson} view theirs @param {Edit} edit mine @param {Base | null} base @returns {Field[]} */
+function editFields(view, edit, base) {
 	const about = { ...BLANK, kind: edit.kind, view: edit.view };
 	if (edit.kind === 'include') {
 		return [{

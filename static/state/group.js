@@ -182,7 +182,7 @@ export function submitVerdict(verdict, turn) {
 	const given = turn?.field === 'undo_of' ? { state: 'unreviewed' } : { state, reason, note };
 	const { id } = enqueue({
 		path: `/groups/${at.id}/verdict`, body: turn ? { ...given, [turn.field]: turn.at } : given, etag: at.etag, group: at.id, method: 'PUT',
-		station: null, edit: null, verdict, base: baseOf(at, at.views[0]?.key), turn: turn && { field: turn.field, key: turn.key },
+		station: null, edit: null, verdict, base: wholeOf(at), turn: turn && { field: turn.field, key: turn.key },
 	});
 	wake();
 	return id;
@@ -218,10 +218,15 @@ export function submitTurn(verb) {
 	wake();
 }
 
-/** What an edit or verdict found. @param {GroupDocument} at @param {string} key @returns {Base} */
+/** What an edit found of its view. @param {GroupDocument} at @param {string} key @returns {Base} */
 function baseOf(at, key) {
 	const { lines, not_visible, balls, included, left_out, station } = viewOf(at, key);
 	return { lines, not_visible, balls, included, left_out, picture: station.picture ?? null, verdict: at.verdict };
+}
+
+/** What a verdict found: all views. @param {GroupDocument} at @returns {Base} */
+function wholeOf(at) {
+	return { ...baseOf(at, at.views[0]?.key), views: Object.fromEntries(at.views.map(({ key }) => [key, baseOf(at, key)])) };
 }
 
 /**
@@ -264,7 +269,7 @@ function delivered(item, answer, first) {
 		if (item.verdict && item.turn?.field !== 'undo_of' && first?.verdict?.at) nameVerdict(item.id, first.verdict.at);
 		// What follows builds on what this one has made.
 		revise((other) => (other.group === item.group && !other.held
-			? { ...other, etag: etagFor(other, answer) } : other));
+			? { ...other, etag: etagFor(other, answer), base: other.verdict ? wholeOf(answer) : other.base } : other));
 		takeOver(answer);
 		if (pending.value.length === 0 && !draft.value) expected.value = null;
 		if (item.edit) keepStation(item.group, item.station);

@@ -16,7 +16,7 @@ import { myName } from './me.js';
 
 /** @typedef {{state: string, reason: string | null, note: string | null}} Verdict */
 /** @typedef {{field: 'undo_of' | 'redo_of', key: string}} Turn   undo or redo of the verdict that a write of that key gave */
-/** @typedef {{lines: Record<string, PointJson[] | null>, not_visible?: string[], balls: BallJson[], included: boolean, left_out?: LeftOutJson | null, picture?: unknown, verdict: VerdictJson}} Base */
+/** @typedef {{lines: Record<string, PointJson[] | null>, not_visible?: string[], balls: BallJson[], included: boolean, left_out?: LeftOutJson | null, picture?: unknown, verdict: VerdictJson, views?: Record<string, Base>}} Base   of one view; `views`: of all, by their keys */
 /**
  * @typedef {object} Item
  * @property {string} id idempotency key: sent twice it counts once

@@ -59,8 +59,8 @@ function FieldRow({ field }) {
 			<th scope="row">${field.name}</th>
 			<td>${wordsFor(field, field.base, null)}</td>
 			<td>${wordsFor(field, field.theirs, field.base)}</td>
-			<td>${wordsFor(field, field.mine, field.base)}</td>
-			<td>${field.overlaps ? 'both changed it' : 'only you changed it'}</td>
+			<td>${field.unchanged ? 'unchanged' : wordsFor(field, field.mine, field.base)}</td>
+			<td>${field.unchanged ? 'only they changed it' : field.overlaps ? 'both changed it' : 'only you changed it'}</td>
 		</tr>
 	`;
 }
@@ -68,10 +68,11 @@ function FieldRow({ field }) {
 export function ConflictBar() {
 	const present = conflict.value;
 	if (!present) return null;
+	const drawn = present.fields.some(({ kind }) => kind === 'ball' || kind === 'lines');
 	return html`
 		<section class="bar conflict" data-tone="warn" role="alert" aria-label="Conflict">
 			<div class="conflict__words">
-				<p><strong>Another person changed this group first.</strong> Their version is shown solid, yours dotted. Choose which to keep.</p>
+				<p><strong>Another person changed this group first.</strong> ${drawn ? 'Their version is shown solid, yours dotted. ' : ''}Choose which to keep.</p>
 				<table class="conflict__fields">
 					<thead><tr><th scope="col">what</th><th scope="col">before</th><th scope="col">theirs</th><th scope="col">yours</th><th scope="col"><span class="hidden-text">overlap</span></th></tr></thead>
 					<tbody>${present.fields.map((field) => html`<${FieldRow} key=${field.key} field=${field} />`)}</tbody>

@@ -217,6 +217,27 @@ class TestConflict:
         assert after["balls"][0]["box"] == now
         assert after["lines"][marking][index]["y"] > point["y"] + 8
 
+    def test_a_verdict_meets_what_the_other_person_changed(
+        self, both: tuple[Screen, Screen], console: Any
+    ) -> None:
+        for part in ("412", *GONE):
+            console.expect(part)
+        mine, theirs = both
+        group = mine.group
+        go_offline(mine.page)
+        mine.press("s")
+        mine.page.wait_for_url(lambda url: f"/review/{group}" not in url)
+        move_ball(theirs, -6)
+        theirs.saved()
+        mine.page.context.set_offline(False)
+        mine.page.wait_for_url(f"**/review/{group}*")
+        bar = mine.page.get_by_role("alert", name="Conflict")
+        row = bar.get_by_role("row", name="Ball of A")
+        expect(row).to_contain_text(re.compile("moved .* px"))
+        expect(row).to_contain_text("only they changed it")
+        bar.get_by_role("button", name="Take theirs").click()
+        expect(bar).to_have_count(0)
+
     def test_a_conflict_survives_a_reload(self, both: tuple[Screen, Screen], console: Any) -> None:
         console.expect("412")
         mine, theirs = both

@@ -89,6 +89,17 @@ describe('conflictOf', () => {
 		assert.deepEqual([field.name, field.overlaps], ['Verdict', true]);
 	});
 
+	it('says beside a verdict what they changed of the views that it found', () => {
+		const verdict = { state: 'accepted', reason: null, note: null };
+		const found = { ...base, views: { '7.png': base } };
+		const theirs = { ...group, views: [{ ...view, station: {}, lines: { 'Middle line': moved }, balls: [{ ...ball, occluded: true }] }] };
+		const { fields, mergeable } = conflictOf(theirs, [{ ...item(null, found), verdict }]);
+		assert.deepEqual(fields.map(({ name, unchanged = false }) => [name, unchanged]), [['Verdict', false], ['Ball of A', true], ['Middle line of A', true]]);
+		assert.ok(!mergeable);
+		assert.ok(fields.slice(1).every(({ edit, verdict: own }) => edit === null && own === null));
+		assert.equal(conflictOf({ ...group, views: [{ ...view, station: {} }] }, [{ ...item(null, found), verdict }]).fields.length, 1);
+	});
+
 	it('drops what was said about a view that is gone', () => {
 		assert.deepEqual(conflictOf({ ...group, views: [] }, [item(lineEdit(moved))]).fields, []);
 	});
