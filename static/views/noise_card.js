@@ -26,6 +26,11 @@ export function isNews({ values, is_new }) {
 	return is_new || Object.keys(values).length > 0;
 }
 
+/** Whether a number of the policy contradicts the estimates; one that it leaves to each image does not. @param {NoiseJson} noise */
+export function isContradicted({ advice, is_new }) {
+	return is_new || advice.some(({ present, agrees }) => present !== null && !agrees);
+}
+
 /**
  * Who has a sigma of their own, for people.
  *

@@ -18,7 +18,7 @@ import { GoldCard } from './gold_card.js';
 import { GuidelinesCard } from './guidelines_card.js';
 import { HeatMap } from './heat_map.js';
 import { MembersCard } from './members_card.js';
-import { isNews, NoiseCard } from './noise_card.js';
+import { isContradicted, isNews, NoiseCard } from './noise_card.js';
 import { Loading, Trouble } from './page_frame.js';
 import { PaintCard } from './paint_card.js';
 import { Pictures } from './pictures_card.js';
@@ -108,7 +108,7 @@ function StatisticsOf({ one }) {
 			<${NoiseCard} dataset=${one.id}>
 				${(/** @type {NoiseJson} */ noise) => (noise.advice.length === 0 ? null : html`
 					<p class="note">
-						${isNews(noise) ? html`The policy’s noise does not match this data: <a class="link" href=${pageAddress(one.name, 'policy')}>use the estimates</a> on the Policy page.` : 'The policy’s noise matches this data.'}</p>`)}
+						${isNews(noise) ? html`${isContradicted(noise) ? 'The policy’s noise does not match this data' : 'The policy does not contradict this data, but the estimates are more exact'}: <a class="link" href=${pageAddress(one.name, 'policy')}>use the estimates</a> on the Policy page.` : 'The policy’s noise matches this data.'}</p>`)}
 			<//>
 			<${Pitches} dataset=${one.id} />
 			<${Pictures} dataset=${one.id} />

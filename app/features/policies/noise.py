@@ -129,12 +129,12 @@ class NoiseReport:
 
     @property
     def values(self) -> dict[str, float]:
-        """The thresholds that would make the policy agree; nothing where it does already."""
-        if not any(
-            item.differs_from_present if self.follows else not item.agrees for item in self.advice
-        ):
-            return {}
-        return {item.name: item.estimate for item in self.advice}
+        """The thresholds that would make the policy agree, without those that do already."""
+        return {
+            item.name: item.estimate
+            for item in self.advice
+            if (item.differs_from_present if self.follows else not item.agrees)
+        }
 
     @property
     def is_new(self) -> bool:

@@ -183,6 +183,15 @@ class TestReadNoise:
         assert [item.name for item in found.advice] == ["given_sigma_px"]
         assert found.line_estimate is None
 
+    def test_what_agrees_already_is_not_among_the_values_to_use(self, store: Store) -> None:
+        make(store, given=False)
+        found = estimate_dataset_noise(store, "demo")
+        click = found.advice[0]
+        agreeing = replace(click, present=click.estimate)
+        open_one = replace(click, name="calibration.line_sigma_px", present=None)
+        assert replace(found, advice=(agreeing,)).values == {}
+        assert list(replace(found, advice=(agreeing, open_one)).values) == [open_one.name]
+
     def test_an_empty_dataset_says_that_nothing_is_known(self, store: Store) -> None:
         ensure_dataset(store, "demo", "ann")
         found = estimate_dataset_noise(store, "demo")
