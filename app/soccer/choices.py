@@ -16,7 +16,7 @@ PolicyName = Literal["paper", "strict", "touchline"]
 VerdictState = Literal["unreviewed", "accepted", "rejected", "deferred"]
 """What people said of a group."""
 VersionRule = Literal["accepted", "passing"]
-"""Which groups enter a version: those that people accepted, or whatever passes and is not rejected."""
+"""Which groups enter a version: those that people accepted, or whatever passes and is neither rejected nor deferred."""
 LiveRule = Literal["passing", "accepted", "all"]
 """Which groups take part in an evaluation against a dataset that is not frozen."""
 SplitKind = Literal["given", "match", "camera"]

@@ -100,6 +100,21 @@ def makes_ball_unusable(kind: str, number: float | None) -> bool:
     return kind == "implausible_ball"
 
 
+def has_unusable_ball(findings: str, dismissed: str, sigma_m: float | None) -> bool:
+    """Whether a finding of a group says that its ball cannot be used; the number of sigma's is sigma.
+
+    One that was dismissed says it, too: a verdict needs the note all the same.
+
+    Args:
+        findings: Open kinds between commas.
+        dismissed: Dismissed kinds between commas.
+        sigma_m: Of the 3D ball, metres; None: not known.
+    """
+    return any(
+        makes_ball_unusable(kind, sigma_m) for kind in (*findings.split(","), *dismissed.split(","))
+    )
+
+
 SAME_SHARE = 0.05
 """A finding whose number has moved by no more than this share of it is still the same."""
 

@@ -26,7 +26,7 @@ function freeName(taken) {
 
 const GROUPS = /** @type {{name: FreezeRequest['groups'], label: string, note: string}[]} */ ([
 	{ name: 'accepted', label: 'Accepted', note: 'by people; groups that fail a gate need a note' },
-	{ name: 'passing', label: 'Passing', note: 'all passing, not rejected' },
+	{ name: 'passing', label: 'Passing', note: 'all passing, neither rejected nor deferred' },
 ]);
 const SPLITS = /** @type {{kind: SplitRequest['kind'], label: string, note: string}[]} */ ([
 	{ kind: 'given', label: 'As imported', note: 'the split that the imported files give' },

@@ -39,7 +39,7 @@ from app.features.verdicts.queries import (
     update_bulk_verdict,
 )
 from app.features.verdicts.service import Verdict, check_verdict
-from app.soccer.finding import makes_ball_unusable
+from app.soccer.finding import has_unusable_ball
 from app.wording import plural
 
 CHUNK = 100
@@ -298,7 +298,11 @@ def select_groups_for_verdict(
             refused[UNSOLVED] += 1
         elif verdict.state == "accepted" and not row.passes and verdict.note is None:
             refused[NEEDS_NOTE] += 1
-        elif verdict.state == "accepted" and verdict.note is None and _is_ball_unusable(row):
+        elif (
+            verdict.state == "accepted"
+            and verdict.note is None
+            and has_unusable_ball(row.findings, row.dismissed, row.sigma_m)
+        ):
             refused[UNUSABLE_BALL] += 1
         elif verdict.state == "accepted" and not row.pictures and verdict.note is None:
             refused[NO_PICTURE] += 1
@@ -312,15 +316,6 @@ def _unsolved_groups(session: Session, dataset_id: int, rows: Sequence[Any]) -> 
     """Groups that this solver has not solved as they are: their rows may tell of an earlier one."""
     few = [row.group_id for row in rows] if len(rows) <= CHUNK else None
     return set(list_unsolved_groups(session, dataset_id, few))
-
-
-def _is_ball_unusable(row: Any) -> bool:
-    """Whether a finding says that nobody can use the ball; the number of sigma's is sigma.
-
-    One that was dismissed says it, too: a verdict needs the note all the same.
-    """
-    kinds = [*row.findings.split(","), *row.dismissed.split(",")]
-    return any(makes_ball_unusable(kind, row.sigma_m) for kind in kinds)
 
 
 def _has_verdict(row: Any, verdict: Verdict) -> bool:

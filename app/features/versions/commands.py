@@ -58,7 +58,9 @@ def freeze(
     ] = None,
     groups: Annotated[
         VersionRule,
-        typer.Option(help="accepted: accepted by people; passing: all passing, not rejected."),
+        typer.Option(
+            help="accepted: accepted by people; passing: all passing, neither rejected nor deferred."
+        ),
     ] = "accepted",
     split: Annotated[
         SplitKind, typer.Option(help="How it is split into train and test.")

@@ -78,7 +78,8 @@ class FreezeRequest:
         note: What a reader of the list should know.
         licence: Text under which the version is passed on; empty: the terms of its sources.
         groups: ``accepted``: what people accepted and the policy passes, or a person overrode;
-            ``passing``: whatever the policy passes, unless a person rejected or deferred it.
+            ``passing``: whatever the policy passes, unless a person rejected or deferred it, or its
+            ball cannot be used and nobody accepted it in spite of that.
     """
 
     name: str | None = None

@@ -21,11 +21,12 @@ from app.features.versions.queries import (
 from app.features.versions.service import Version, read_version
 from app.soccer.choices import VersionRule
 from app.soccer.codec import policy_to_json
+from app.soccer.finding import has_unusable_ball
 from app.soccer.policy import Policy
 from app.wording import plural
 
 RULES: tuple[str, ...] = get_args(VersionRule)
-UNSOLVED = "not solved"
+UNSOLVED, UNUSABLE_BALL = "not solved", "unusable ball"
 _DIGITS = re.compile(r"(\d+)")
 
 
@@ -122,6 +123,9 @@ def _why_excluded_by_accepted_rule(row: CandidateRow) -> str | None:
 def _why_excluded_by_passing_rule(row: CandidateRow) -> str | None:
     if row.status in ("rejected", "deferred"):
         return _why_rejected_or_deferred(row)
+    accepted = row.status == "accepted" and not row.stale
+    if row.passes and not accepted and has_unusable_ball(row.findings, row.dismissed, row.sigma_m):
+        return _why_gates_fail(row) or UNUSABLE_BALL
     return _why_gates_fail(row)
 
 

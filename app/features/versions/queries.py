@@ -183,6 +183,9 @@ class CandidateRow(NamedTuple):
     stale: bool
     passes: bool | None
     gate: str | None
+    findings: str
+    dismissed: str
+    sigma_m: float | None
     solved: bool
     reason: str | None
     note: str | None
@@ -320,6 +323,9 @@ def list_candidate_rows(session: Session, dataset_id: int) -> Sequence[Candidate
         "stale",
         "passes",
         "gate",
+        "findings",
+        "dismissed",
+        "sigma_m",
     )
     statement = (
         select(

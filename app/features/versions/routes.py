@@ -100,7 +100,8 @@ class VersionRequest(
     split: SplitChoice = SplitChoice()
     groups: VersionRule = Field(
         default="accepted",
-        description="Groups that people accepted, or all groups that pass the policy and are not rejected.",
+        description="Groups that people accepted, or all groups that pass the policy and are neither "
+        "rejected nor deferred, without those whose ball cannot be used unless a person accepted them.",
     )
     dry_run: StrictBool = Field(default=False, description="Count, and freeze nothing.")
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from sqlalchemy import delete, func, select, text
+from sqlalchemy import delete, func, select, text, update
 
 from app.db.log import LogModel
 from app.errors import ConflictError, InputError
@@ -13,6 +13,7 @@ from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import import_groups
 from app.features.policies.service import change_policy
 from app.features.queue.service import list_groups
+from app.features.queue.tables import QueueModel
 from app.features.solutions.queries import SolutionModel
 from app.features.solutions.service import solve_dataset
 from app.features.verdicts.service import set_verdict
@@ -148,6 +149,22 @@ class TestFreeze:
         rows = {row.key.rpartition("/")[2]: row for row in rows_of(store, version)}
         assert {key for key, row in rows.items() if row.member} == {"7.png", "9.png", "11.png"}
         assert rows["10.png"].why == "fails reprojection"
+
+    def test_a_ball_that_cannot_be_used_passes_only_with_the_word_of_a_person(
+        self, store, judged
+    ) -> None:
+        with store.write() as session:
+            unusable = {"findings": ",implausible_ball,", "passes": True}
+            chosen = QueueModel.group_id.in_((judged[0], judged[4]))
+            session.execute(update(QueueModel).where(chosen).values(unusable))
+        request = FreezeRequest("v1", groups="passing")
+        assert plan_freeze(store, "demo", request).left_out["unusable ball"] == 1
+        rows = {
+            row.key.rpartition("/")[2]: row
+            for row in rows_of(store, frozen(store, groups="passing"))
+        }
+        assert (rows["7.png"].member, rows["11.png"].member) == (True, False)
+        assert rows["11.png"].why == "unusable ball"
 
     def test_a_group_that_changed_after_its_verdict_stays_out(self, store, judged) -> None:
         etag = load_group_state(store, judged[0]).etag
