@@ -9,7 +9,7 @@ import { chosenPlace, dropCross, setCross } from './drawing_cross.js';
 import { applyEdit } from './edits.js';
 import { group, solution, submit } from './group.js';
 import { announce, complain, explain } from './notice.js';
-import { drawing, focused, focusView, isSmall, pointerPlace, selected } from './workspace.js';
+import { drawing, focused, focusView, isSmall, isTouched, pointerPlace, selected } from './workspace.js';
 
 /** @import {GroupDocument, PointJson, ViewJson} from '../api/types.js' */
 /** @import {ScreenPoint, Viewport} from '../geometry/viewport.js' */
@@ -27,7 +27,7 @@ function targetView() {
 /** Say that drawing needs room, where there is too little. */
 function hasNoRoom() {
 	const small = isSmall();
-	if (small) complain('Drawing needs a wider screen: open this group on a computer.');
+	if (small) complain(`Drawing needs ${isTouched() ? 'a wider screen: open this group on a computer' : 'a larger window, or a smaller zoom'}.`);
 	return small;
 }
 

@@ -74,9 +74,14 @@ export function cycleGain() {
 	gain.value = GAINS[(GAINS.indexOf(gain.value) + 1) % GAINS.length];
 }
 
+/** Whether a finger points: as on a phone. */
+export function isTouched() {
+	return globalThis.matchMedia?.('(pointer: coarse)').matches ?? false;
+}
+
 /** Whether the window is as small as a phone's: there groups are looked at and judged, not drawn in. As in `css/phone.css`. */
 export function isSmall() {
-	return globalThis.matchMedia?.('(max-width: 640px), (max-height: 480px)').matches ?? false;
+	return globalThis.matchMedia?.('(max-width: 640px), (max-height: 480px) and (pointer: coarse)').matches ?? false;
 }
 
 /** Look at the other 3D ball. */

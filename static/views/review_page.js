@@ -72,7 +72,7 @@ function Workspace() {
 	return html`
 		<${ReviewMain} pictures=${pictures}>
 			${sceneShown.value ? html`<${Scene3D} group=${shown} solution=${found} />` : html`<${ImageGrid} pictures=${pictures} />`}
-			<p class="small-note">Look, comment and decide here. To draw or move points and balls, open the group on a wider screen.</p>
+			<p class="small-note">Look, comment and decide here. To draw or move points and balls, open the group on a wider screen or in a wider window.</p>
 			<${BottomStrip} group=${shown} solution=${solved} pictures=${pictures} />
 		<//>
 		<${Rail} group=${shown} solution=${solved} pictures=${pictures} live=${live} />

@@ -165,7 +165,9 @@ class TestEditors:
 
     def test_the_calibration_editor(self, phone: OpenPhone) -> None:
         page = phone("/review/1/calibration")
-        expect(page.get_by_text("The calibration editor needs a wider screen.")).to_be_visible()
+        expect(
+            page.get_by_text("The calibration editor needs a wider screen or window.")
+        ).to_be_visible()
         expect(page.locator(".editor__main, .editor__rail").first).to_be_hidden()
         assert fits(page) == {}
         page.get_by_role("link", name="Back to the review").tap()
@@ -179,10 +181,26 @@ class TestEditors:
         expect(page.locator(".bar")).to_contain_text("Drawing needs a wider screen")
         expect(page.get_by_placeholder("Ball or marking")).to_have_count(0)
         page.keyboard.press("\\")
-        expect(page.get_by_text("The 3D view needs a wider screen.")).to_be_visible()
+        expect(page.get_by_text("The 3D view needs a wider screen or window.")).to_be_visible()
         assert soon(page, TOO_WIDE) == []
         page.get_by_role("button", name="Images").locator("visible=true").tap()
         screen.ready()
+
+    def test_a_computer_draws_in_a_window_at_200_per_cent(
+        self, open_page: Callable[..., Page]
+    ) -> None:
+        page = open_page("/review/1", size={"width": 720, "height": 450})
+        Screen(page).ready()
+        page.keyboard.press("n")
+        expect(page.get_by_placeholder("Ball or marking")).to_be_visible()
+
+    def test_a_computer_is_told_to_make_its_window_larger(
+        self, open_page: Callable[..., Page]
+    ) -> None:
+        page = open_page("/review/1", size={"width": 600, "height": 700})
+        Screen(page).ready()
+        page.keyboard.press("n")
+        expect(page.locator(".bar")).to_contain_text("a larger window, or a smaller zoom")
 
     def test_they_are_silent_where_there_is_room(self, open_page: Callable[..., Page]) -> None:
         page = open_page("/review/1")

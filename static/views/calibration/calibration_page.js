@@ -166,7 +166,7 @@ export function CalibrationPage() {
 				<${SaveState} />
 			<//>
 			<div class="bars"><${NoticeBar} /><${ConflictBar} /></div>
-			<p class="small-note">The calibration editor needs a wider screen. ${wanted === null ? null : html`<a class="button" href=${reviewAddress(wanted)}>Back to the review</a>`}</p>
+			<p class="small-note">The calibration editor needs a wider screen or window. ${wanted === null ? null : html`<a class="button" href=${reviewAddress(wanted)}>Back to the review</a>`}</p>
 			${group && at ? html`<${Workspace} group=${group} at=${at} />` : html`<${Absent} id=${absent === wanted ? absent : 0} />`}
 		</div>
 	`;

@@ -30,7 +30,7 @@ export function Scene3D({ group, solution }) {
 	}, []);
 	return html`
 		<section class="scene3d" aria-label="3D view" aria-busy=${!panel && !failed}>
-			<p class="small-note">The 3D view needs a wider screen. <button class="button" type="button" onClick=${() => { sceneShown.value = false; }}>Images</button></p>
+			<p class="small-note">The 3D view needs a wider screen or window. <button class="button" type="button" onClick=${() => { sceneShown.value = false; }}>Images</button></p>
 			${panel ? html`<${panel.show} group=${group} solution=${solution} />` : html`
 				<p class="scene3d__missing" role="status">${failed || 'Loading the 3D view…'}
 					<button class="button" type="button" onClick=${() => { sceneShown.value = false; }}>Images <kbd>\\</kbd></button>

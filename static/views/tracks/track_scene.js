@@ -22,7 +22,7 @@ export function TrackSpace(props) {
 	}, []);
 	return html`
 		<section class="scene3d track__space" aria-label="3D view" aria-busy=${!panel && !failed}>
-			<p class="small-note">The 3D view needs a wider screen. <button class="button" type="button" onClick=${props.leave}>Curves</button></p>
+			<p class="small-note">The 3D view needs a wider screen or window. <button class="button" type="button" onClick=${props.leave}>Curves</button></p>
 			${panel ? html`<${panel.show} ...${props} />` : html`<p class="scene3d__missing" role="status">${failed || 'Loading the 3D view…'}</p>`}
 		</section>
 	`;
