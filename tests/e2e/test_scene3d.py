@@ -95,6 +95,33 @@ class TestScene:
             arg=f"translate({before[0]:.1f}px, {before[1]:.1f}px)",
         )
 
+    def test_the_ball_is_followed_to_the_next_group_after_the_scene_was_turned(
+        self, review: Callable[..., Screen]
+    ) -> None:
+        page = review(0).page
+        show(page)
+        expect(page.locator(".header__place")).to_contain_text("of")
+        page.keyboard.press("z")
+        expect(page.get_by_role("button", name="Ball Z")).to_have_attribute("aria-pressed", "true")
+        box = at_rest(page.locator(".scene3d__stage"))
+
+        def is_in_the_middle() -> bool:
+            x, y = label(page, "ball")
+            away = max(
+                abs(x - box["width"] / 2) / box["width"], abs(y - box["height"] / 2) / box["height"]
+            )
+            return away < 0.25
+
+        until(page, is_in_the_middle)
+        page.locator(".scene3d__stage canvas").focus()
+        for _ in range(3):
+            page.keyboard.press("ArrowLeft")
+        address = page.url
+        page.keyboard.press("f")
+        page.wait_for_url(lambda url: url != address)
+        until(page, is_in_the_middle)
+        expect(page.get_by_role("button", name="Ball Z")).to_have_attribute("aria-pressed", "true")
+
     def test_a_camera_shows_the_ball_where_its_image_does(
         self, review: Callable[..., Screen]
     ) -> None:

@@ -6,7 +6,7 @@ import { ellipsoidOf, symmetricEigen } from '../../static/geometry/ellipsoid.js'
 import { dot } from '../../static/geometry/matrix.js';
 import { fit, toScreen } from '../../static/geometry/viewport.js';
 import {
-	approached, axesOf, between, cameraProjection, eyeOf, freeProjection, presetOrbit, shifted, toWorld, turned,
+	approached, axesOf, between, cameraProjection, carried, eyeOf, freeProjection, presetOrbit, shifted, toWorld, turned,
 } from '../../static/views/scene3d/standpoints.js';
 import { withTrackNames } from '../../static/views/scene3d/track_values.js';
 import { sceneOf, seenAt } from '../../static/views/scene3d/values.js';
@@ -66,6 +66,13 @@ function seenFrom(orbit, aspect, point) {
 
 describe('orbits', () => {
 	const scene = { pitch: { length: 105, width: 68 }, stands: [], pairs: [], ball: null, best: null, diameter: 0.22 };
+
+	it('moves with the ball and stays turned', () => {
+		const before = { target: /** @type {[number, number, number]} */ ([1, 0, 2]), distance: 5, azimuth: 0.35, elevation: 0.3 };
+		const after = { ...before, target: /** @type {[number, number, number]} */ ([10, 1, -20]), distance: 9 };
+		const orbit = carried(approached(turned(before, 1, 0.2), 2), before, after);
+		assert.deepEqual(orbit, { target: [10, 1, -20], distance: 10, azimuth: 1.35, elevation: 0.5 });
+	});
 
 	it('stand above the grass on the side of the near side line', () => {
 		const eye = eyeOf(presetOrbit('whole', scene, 1.6));

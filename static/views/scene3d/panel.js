@@ -100,10 +100,12 @@ export function Stage({ scene, images, habits }) {
 		if (at.kind === 'camera') stage.lookThrough(at.letter);
 		else stage.goTo(presetOrbit(at.preset, scene, stage.aspect), !calm.matches);
 	}, [stage, ready, at]);
-	// Another group or another panel asks for another distance, unless somebody has turned the scene.
+	// Another group or another panel asks for another distance, unless somebody has turned the scene: then the ball is followed.
 	useEffect(() => {
-		if (!stage?.untouched || at.kind !== 'preset') return;
-		stage.goTo(presetOrbit(at.preset, scene, stage.aspect), false);
+		if (!stage || at.kind !== 'preset') return;
+		const orbit = presetOrbit(at.preset, scene, stage.aspect);
+		if (stage.untouched) stage.goTo(orbit, false);
+		else if (at.preset === 'ball' && (scene.ball ?? scene.best)) stage.follow(orbit);
 	}, [scene, size.width, size.height]);
 	const keys = useMemo(() => sceneKeys(() => stage, habits), [stage, habits]);
 	useKeys(keys);

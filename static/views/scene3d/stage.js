@@ -6,7 +6,7 @@ import { Color, Group, Matrix4, PerspectiveCamera, Quaternion, Raycaster, Scene,
 import { ballGroup } from './balls.js';
 import { framePicture, frustum, ray } from './cameras.js';
 import { pitchGroup, segments } from './pitch.js';
-import { axesOf, between, cameraProjection, eyeOf, freeProjection, toWorld } from './standpoints.js';
+import { axesOf, between, cameraProjection, carried, eyeOf, freeProjection, toWorld } from './standpoints.js';
 
 /** @import {Object3D} from 'three' */
 /** @import {Palette} from './scene_colours.js' */
@@ -125,6 +125,14 @@ export class SceneStage {
 			if (this.flying) this.flight = requestAnimationFrame(step);
 		};
 		step();
+	}
+
+	/** Move with what the preset looks at; how somebody has turned the scene stays. @param {Orbit} preset */
+	follow(preset) {
+		const [from, orbit] = [this.preset, this.orbit];
+		if (!from || !orbit) return;
+		this.preset = preset;
+		this.set(carried(orbit, from, preset));
 	}
 
 	/** @param {Orbit} orbit */

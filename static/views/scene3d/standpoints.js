@@ -60,6 +60,11 @@ export function approached(orbit, factor) {
 	return { ...orbit, distance: clamp(orbit.distance * factor, NEAREST, FARTHEST) };
 }
 
+/** The orbit with its target moved as that of a preset has moved. @param {Orbit} orbit @param {Orbit} before @param {Orbit} after @returns {Orbit} */
+export function carried(orbit, before, after) {
+	return { ...orbit, target: /** @type {WorldPoint} */ (orbit.target.map((value, i) => value + after.target[i] - before.target[i])) };
+}
+
 /**
  * The orbit with its target moved in the plane of the screen.
  *
