@@ -38,6 +38,15 @@ NUMBERS = {name: item.column for name, item in BY_NAME.items() if item.column}
 SORTS = NUMBERS | {order.name: order.column for order in ORDERS}
 """What the queue can be sorted by, and the column of it."""
 
+EXAMPLES = {
+    "jac": "0.95", "agreement": "0.9", "error_percent": "0.2", "sigma": "0.5", "parallax": "10", "size_ratio": "1.2",
+    "height": "2", "distance": "60", "box": "12", "x": "20", "y": "10", "margin": "0.1", "value": "0.1", "views": "3",
+    "number": "100", "submissions": "2",
+}  # fmt: skip
+"""A usual value of each number; 1.5 of the others."""
+
+_MISTAKEN = re.compile(r"(?P<field>[a-z_0-9]+)(?:(?P<open><=|>=|<|>|=|:)$|[~!≈≠≤≥])")
+"""A field without a value, or with an operator that there is not."""
 _REVERSE = "sort:name-desc is the reverse."
 _TERM = re.compile(
     r"""\s*(?P<minus>-)?
@@ -132,7 +141,32 @@ def _parse_terms(text: str, longest: int) -> Iterator[tuple[bool, _QueryTerm]]:
             bool(found["minus"]),
             _QueryTerm(found["field"] or "", found["op"] or ":", value, pointer),
         )
+        if not found["field"] and found["plain"]:
+            _refuse_mistaken_term(value, pointer)
         place = found.end()
+
+
+def _refuse_mistaken_term(word: str, pointer: str) -> None:
+    """Refuse a word that begins as a field does and is none: nobody looks for that in a label."""
+    found = _MISTAKEN.match(word)
+    field_ = None if found is None else BY_NAME.get(found["field"])
+    if found is None or field_ is None:
+        return
+    name = found["field"]
+    problem = (
+        f"{name} has no value"
+        if found["open"]
+        else f"{name} cannot be compared like that; it has {' and '.join(field_.operators)}"
+    )
+    raise InputError(problem, hint=f"For example {_make_example(name)}.", pointer=pointer)
+
+
+def _make_example(name: str) -> str:
+    """A term with a field, as somebody may write it."""
+    field_ = BY_NAME[name]
+    if field_.kind == "number":
+        return f"{name}<{EXAMPLES.get(field_.name, '1.5')}"
+    return f"{name}:{'12' if field_.kind == 'ids' else next(iter(field_.values), 'text')}"
 
 
 def _parse_sort(term: _QueryTerm) -> tuple[str, bool]:
@@ -161,7 +195,7 @@ def _require_operator(term: _QueryTerm) -> None:
     if term.op not in field_.operators:
         raise InputError(
             f"{term.field} cannot be compared with {term.op}; it has {' and '.join(field_.operators)}",
-            hint=f"For example {term.field}:{next(iter(field_.values), 'text')}.",
+            hint=f"For example {_make_example(term.field)}.",
             pointer=term.pointer,
         )
 
@@ -218,9 +252,12 @@ def _parse_number(term: _QueryTerm) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
+        hint = f"For example {_make_example(term.field)}, or {term.field}:none."
+        if "," in term.value:
+            hint += " Numbers have a decimal point."
         raise InputError(
             f'"{term.value}" is not a number',
-            hint=f"For example {term.field}<1.5, or {term.field}:none.",
+            hint=hint,
             pointer=term.pointer,
         )
     return value

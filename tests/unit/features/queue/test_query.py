@@ -48,6 +48,11 @@ class TestParseQuery:
             ("finding:ghosts", "/q/0"),
             ("gate:none,heaven", "/q/0"),
             ("split<train", "/q/0"),
+            ("views:2 status:", "/q/8"),
+            ("-jac<", "/q/0"),
+            ("jac~0.9", "/q/0"),
+            ("error!=2", "/q/0"),
+            ("sigma≤0.5", "/q/0"),
             ("sort:colour", "/q/0"),
             ("jac<nan", "/q/0"),
             ("passes:maybe", "/q/0"),
@@ -77,6 +82,16 @@ class TestParseQuery:
         with pytest.raises(InputError, match='"15x" is not the id of a group') as caught:
             parse_query("id:12,15x")
         assert "id:12,15,19" in str(caught.value.hint)
+
+    def test_what_is_no_number_is_answered_with_a_usual_one(self) -> None:
+        with pytest.raises(InputError, match='"0,95" is not a number') as caught:
+            parse_query("jac<0,95")
+        hint = "For example jac<0.95, or jac:none. Numbers have a decimal point."
+        assert caught.value.hint == hint
+
+    @pytest.mark.parametrize("text", ["x-12", "view-7/2", "12:", "note:", '"jac~0.9"', "a~b"])
+    def test_a_word_that_only_looks_like_a_field_stays_a_word(self, text: str) -> None:
+        assert len(parse_query(text).conditions) == 1
 
     def test_a_list_of_groups_may_be_long_where_the_caller_says_so_and_nothing_else(self) -> None:
         listed = "id:" + ",".join(map(str, range(1, 15_001)))
