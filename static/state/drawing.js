@@ -39,7 +39,8 @@ export function startDrawing(letter) {
 	const object = selected.value;
 	const goesOn = object?.kind === 'point' && object.view === view.key;
 	if (goesOn) startMarking(view, object.marking);
-	else drawing.value = { view: view.key, what: 'ask', marking: '' };
+	// What asks may open over the pointer, and hide where it was.
+	else drawing.value = { view: view.key, what: 'ask', marking: '', over: letter ? null : pointerPlace.value };
 }
 
 /** Draw the ball of a view. @param {ViewJson} view @param {PointJson} [at] where it may be, if more is known than the solution says */
@@ -85,7 +86,7 @@ export function chooseDrawing(marking) {
 	if (!view) return;
 	if (marking === null) {
 		startBall(view);
-		const over = pointerPlace.value;
+		const over = pointerPlace.value ?? present?.over;
 		// Who asked for a ball with the pointer on it means that place; elsewhere a click says where.
 		if (over?.view === view.key) drawAt(view, over.at);
 		return;

@@ -28,9 +28,9 @@ export const editing = signal(false);
 export const pointerPlace = signal(/** @type {PointerPlace | null} */ (null));
 /** Whether the magnifying glass is held. */
 export const loupe = signal(false);
-/** What a click draws; null when nothing. `ask`: the person chooses what. */
+/** What a click draws; null when nothing. `ask`: the person chooses what; `over`: where the pointer was before. */
 export const drawing = signal(
-	/** @type {{view: string, what: 'ask' | 'ball' | 'line', marking: string} | null} */ (null),
+	/** @type {{view: string, what: 'ask' | 'ball' | 'line', marking: string, over?: PointerPlace | null} | null} */ (null),
 );
 
 /** Another frame than its own that a view shows, with nothing drawn on it; null: none does. `view` is an id. */

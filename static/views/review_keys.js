@@ -91,8 +91,10 @@ function zoomToBall() {
 		return;
 	}
 	const { width, height } = stage.getBoundingClientRect();
-	if (isZoomed(focused.value)) fitPanel(focused.value);
+	const zoomed = isZoomed(focused.value);
+	if (zoomed) fitPanel(focused.value);
 	else zoomTo(focused.value, { width, height }, center, BALL_SCALE);
+	announce(`View ${focused.value} ${zoomed ? 'is shown whole' : 'is zoomed to the ball'}.`);
 }
 
 /** Crop the images to their panels, or show them whole. */
@@ -176,6 +178,7 @@ function showGates() {
 function showAll() {
 	maximised.value = null;
 	fitAll();
+	announce('All views are shown whole.');
 }
 
 function flipOverlays() {
@@ -272,11 +275,11 @@ const VIEW = [
 	{ keys: ['g'], label: 'Gates: thresholds and margins', group: 'View', run: showGates },
 	{
 		keys: ['Shift+l'], label: 'Main camera large, or all views equal', group: 'View',
-		run: () => { equalViews.value = !equalViews.value; },
+		run: () => { equalViews.value = !equalViews.value; announce(equalViews.value ? 'All views are equally large.' : 'The main camera is large.'); },
 	},
 	{
 		keys: ['l'], label: 'Collapse the strip with ball, lines and pitch', group: 'View',
-		run: () => { stripCollapsed.value = !stripCollapsed.value; },
+		run: () => { stripCollapsed.value = !stripCollapsed.value; announce(`Strip with ball, lines and pitch ${stripCollapsed.value ? 'collapsed' : 'shown'}.`); },
 	},
 ];
 

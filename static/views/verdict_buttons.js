@@ -4,6 +4,7 @@
 import { html } from 'htm/preact';
 import { useLayoutEffect, useMemo, useRef } from 'preact/hooks';
 
+import { withValue } from '../lib/field.js';
 import { plural } from '../lib/format.js';
 import { useKeys } from '../lib/hooks.js';
 import { navigate } from '../lib/router.js';
@@ -15,6 +16,7 @@ import {
 	accept, acceptAsSaved, answer, askReason, cancelAsking, defer, isBlind, lastReason, reject, rejectView, rejectViewBecause,
 } from '../state/verdicts.js';
 import { stagedIn } from '../state/staging.js';
+import { commentDraft, keepCommentDraft } from '../state/threads.js';
 import { asking } from '../state/workspace.js';
 import { SubmitButton } from './lease_bar.js';
 import { SwapAsk } from './swap_ask.js';
@@ -68,8 +70,9 @@ function ReasonList({ title, choose, again, keys, suggested = null }) {
 	`;
 }
 
-/** @param {{title: string, button: string, onNote?: (note: string) => void}} props */
-function NoteForm({ title, button, onNote = answer }) {
+/** @param {{group: number, title: string, button: string, onNote?: (note: string) => void}} props */
+function NoteForm({ group, title, button, onNote = answer }) {
+	const draft = `verdict-note ${asking.value}`;
 	const field = useRef(/** @type {HTMLInputElement | null} */ (null));
 	// Before the next key: who types at once must not find the letters doing something else.
 	useLayoutEffect(() => field.current?.focus(), []);
@@ -77,8 +80,12 @@ function NoteForm({ title, button, onNote = answer }) {
 	function send(event) {
 		event.preventDefault();
 		const note = field.current?.value.trim();
-		if (note) onNote(note);
-		else field.current?.focus();
+		if (!note) {
+			field.current?.focus();
+			return;
+		}
+		keepCommentDraft(group, draft, '');
+		onNote(note);
 	}
 	/** @param {KeyboardEvent} event */
 	function key(event) {
@@ -87,7 +94,7 @@ function NoteForm({ title, button, onNote = answer }) {
 	return html`
 		<form class="ask" onSubmit=${send} onKeyDown=${key}>
 			<label class="ask__title" for="verdict-note">${title}</label>
-			<input id="verdict-note" class="field" ref=${field} maxlength="500" autocomplete="off" required />
+			<input id="verdict-note" class="field" ref=${field} maxlength="500" autocomplete="off" required defaultValue=${commentDraft(group, draft)} onInput=${withValue((text) => keepCommentDraft(group, draft, text))} />
 			<p class="ask__buttons">
 				<button class="button button--primary" type="submit">${button} <kbd>Enter</kbd></button>
 				<button class="button" type="button" onClick=${cancelAsking}>Cancel <kbd>Esc</kbd></button>
@@ -133,12 +140,12 @@ function acceptTitle(group) {
 function Ask({ group }) {
 	if (asking.value === 'reason') return html`<${ReasonList} key="group" ...${GROUP_REASONS} suggested=${suggestedReason(group.solution)} />`;
 	if (asking.value === 'view') return html`<${ReasonList} key="view" ...${VIEW_REASONS} />`;
-	if (asking.value === 'viewNote') return html`<${NoteForm} title="Why is this view left out?" button="Leave out" onNote=${rejectViewBecause} />`;
-	if (asking.value === 'note') return html`<${NoteForm} title="What is wrong with this group?" button="Reject" />`;
+	if (asking.value === 'viewNote') return html`<${NoteForm} group=${group.id} title="Why is this view left out?" button="Leave out" onNote=${rejectViewBecause} />`;
+	if (asking.value === 'note') return html`<${NoteForm} group=${group.id} title="What is wrong with this group?" button="Reject" />`;
 	if (asking.value === 'staged') return html`<${StagedAsk} group=${group} />`;
 	if (asking.value === 'swap') return html`<${SwapAsk} group=${group} />`;
 	if (asking.value !== 'override') return null;
-	return html`<${NoteForm} title=${acceptTitle(group)} button="Accept" />`;
+	return html`<${NoteForm} group=${group.id} title=${acceptTitle(group)} button="Accept" />`;
 }
 
 /** @param {{group: GroupDocument}} props */

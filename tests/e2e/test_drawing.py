@@ -52,6 +52,28 @@ class TestDrawing:
         assert box[2] == pytest.approx(width, rel=0.5)
         undo(screen, before)
 
+    def test_a_ball_is_drawn_at_the_pointer_though_the_list_opens_over_it(
+        self, review: Review
+    ) -> None:
+        screen = review(1)
+        before = first_view(screen)
+        box = screen.page.locator('.image-panel[data-view="A"] .image-panel__stage').bounding_box()
+        assert box is not None
+        screen.press("i", "Delete", "Escape")
+        place = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        screen.page.mouse.move(*place)
+        screen.press("n")
+        chooser = screen.page.locator(".chooser")
+        expect(chooser).to_be_visible()
+        over = chooser.bounding_box()
+        assert over is not None
+        screen.page.mouse.move(over["x"] + 20, over["y"] + 20)
+        screen.page.keyboard.type("ball")
+        screen.press("Enter")
+        screen.saved()
+        until(screen.page, lambda: first_view(screen)["balls"])
+        undo(screen, before)
+
     def test_a_new_marking_is_drawn_click_by_click(self, review: Review) -> None:
         screen = review(1)
         before = first_view(screen)

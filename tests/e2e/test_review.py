@@ -420,6 +420,19 @@ class TestLooking:
         screen.press("g")
         expect(margins).to_have_count(0)
 
+    def test_keys_that_change_what_is_shown_say_so(self, review: Callable[..., Screen]) -> None:
+        screen = review(0)
+        for key, said in (
+            ("l", "collapsed"),
+            ("l", "Strip with ball, lines and pitch shown"),
+            ("Shift+l", "equally large"),
+            ("Shift+l", "The main camera is large"),
+            ("z", "zoomed to the ball"),
+            ("0", "All views are shown whole"),
+        ):
+            screen.press(key)
+            expect(screen.page.locator("[aria-live]").filter(has_text=said)).to_have_count(1)
+
 
 class TestVerdicts:
     def test_a_reviewer_accepts_rejects_and_exports(
@@ -502,6 +515,16 @@ class TestVerdicts:
         assert said == ["deferred", "rejected", "deferred", "unreviewed"]
         for group in chain[:3]:
             withdraw_verdict(page, group)
+
+    def test_a_note_that_is_begun_is_there_again(self, review: Callable[..., Screen]) -> None:
+        screen = review(1)
+        screen.press("x", "7")
+        note = screen.page.get_by_label("What is wrong with this group?")
+        note.fill("the ball is behind the post")
+        screen.press("Escape")
+        expect(note).to_have_count(0)
+        screen.press("x", "7")
+        expect(note).to_have_value("the ball is behind the post")
 
     def test_a_failing_group_is_accepted_only_with_a_reason(self, open_page: OpenPage) -> None:
         page = open_page(None)
