@@ -356,7 +356,7 @@ def _make_pinned_options(
 
 def _no_frames_error(dataset: DatasetHead, request: EvaluationRequest) -> InputError:
     of = f' in the split "{request.split}"' if request.split else ""
-    hint = "A group is evaluated when the policy passes it, its ball can be used and it is neither rejected nor deferred."
+    hint = "A group is evaluated when the policy passes it and it is neither rejected nor deferred."
     if request.groups == "accepted":
         hint = "No group is accepted yet: accept some, or evaluate the passing ones."
     return InputError(f'no group of "{dataset.name}" can be evaluated{of}', hint=hint)

@@ -78,7 +78,8 @@ def read_live_truth(
     """
     if rule not in LIVE_RULES:
         raise unknown_group_rule_error(rule)
-    candidates = read_candidates(session, dataset.id, "passing" if rule == "all" else rule)
+    wanted = "passing" if rule == "all" else rule
+    candidates = read_candidates(session, dataset.id, wanted, any_ball=True)
     require_solved(candidates, dataset.name)
     ids = [item.id for item in candidates if item.why is None or rule == "all"]
     frames: list[GroundTruthFrame] = []

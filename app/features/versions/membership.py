@@ -58,9 +58,19 @@ class Candidate:
         return self.why is None and self.verdict is not None and bool(self.verdict["override"])
 
 
-def read_candidates(session: Session, dataset_id: int, rule: str) -> list[Candidate]:
-    """Every group of a dataset, by match and key: an order that no machine changes."""
-    found = [_candidate_from_row(row, rule) for row in list_candidate_rows(session, dataset_id)]
+def read_candidates(
+    session: Session, dataset_id: int, rule: str, *, any_ball: bool = False
+) -> list[Candidate]:
+    """Every group of a dataset, by match and key: an order that no machine changes.
+
+    Args:
+        session: Session.
+        dataset_id: The dataset.
+        rule: One of ``RULES``.
+        any_ball: Whether ``passing`` takes balls that cannot be used, too.
+    """
+    rows = list_candidate_rows(session, dataset_id)
+    found = [_candidate_from_row(row, rule, any_ball) for row in rows]
     return sorted(found, key=lambda item: (item.match, natural_sort_key(item.key), item.key))
 
 
@@ -83,11 +93,11 @@ def require_solved(candidates: Sequence[Candidate], dataset: str) -> None:
         )
 
 
-def _candidate_from_row(row: CandidateRow, rule: str) -> Candidate:
+def _candidate_from_row(row: CandidateRow, rule: str, any_ball: bool) -> Candidate:
     why = (
         _why_excluded_by_accepted_rule(row)
         if rule == "accepted"
-        else _why_excluded_by_passing_rule(row)
+        else _why_excluded_by_passing_rule(row, any_ball)
     )
     return Candidate(
         id=row.group_id,
@@ -120,13 +130,15 @@ def _why_excluded_by_accepted_rule(row: CandidateRow) -> str | None:
     return _why_gates_fail(row)
 
 
-def _why_excluded_by_passing_rule(row: CandidateRow) -> str | None:
+def _why_excluded_by_passing_rule(row: CandidateRow, any_ball: bool) -> str | None:
     if row.status in ("rejected", "deferred"):
         return _why_rejected_or_deferred(row)
+    why = _why_gates_fail(row)
     accepted = row.status == "accepted" and not row.stale
-    if row.passes and not accepted and has_unusable_ball(row.findings, row.dismissed, row.sigma_m):
-        return _why_gates_fail(row) or UNUSABLE_BALL
-    return _why_gates_fail(row)
+    if why is None and not accepted and not any_ball:
+        unusable = has_unusable_ball(row.findings, row.dismissed, row.sigma_m)
+        return UNUSABLE_BALL if unusable else None
+    return why
 
 
 def _why_rejected_or_deferred(row: CandidateRow) -> str | None:
