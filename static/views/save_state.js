@@ -54,7 +54,7 @@ function StagedLink() {
 	const group = groupDocument.value;
 	const { count, view } = group ? stagedIn(group) : { count: 0 };
 	if (!group || !view || page.value.page !== 'review') return null;
-	return html`<a class="save__conflict" href=${editorAddress(group.id, view)}>${plural(count, 'marking')} staged, not saved – open the editor</a>`;
+	return html`<a class="save__conflict" href=${editorAddress(group.id, view)} title="Open the calibration editor">${plural(count, 'marking')} staged, not saved</a>`;
 }
 
 /** @param {{elsewhere?: boolean}} props `elsewhere`: no group is on screen, so that only what is not saved is worth a word */

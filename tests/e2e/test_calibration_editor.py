@@ -206,7 +206,7 @@ class TestStaging:
         editor.staged(1)
         editor.press("Escape", "Escape")
         page.wait_for_url(f"**/review/{editor.group}")
-        link = page.get_by_role("link", name="1 marking staged, not saved – open the editor")
+        link = page.get_by_role("link", name="1 marking staged, not saved")
         expect(link).to_be_visible()
         editor.press("a")
         asked = page.get_by_role("region", name="1 marking staged in the calibration editor")
