@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -127,7 +128,9 @@ def test_a_shot_is_tracked_and_lines_follow_its_frames(recording: int, open_page
     outcomes = page.get_by_role("list", name="Outcomes").get_by_role("listitem")
     expect(outcomes).to_have_count(3)
     expect(outcomes.nth(1)).to_contain_text("frames 3 to 4: lost")
-    charts = page.get_by_role("region", name="Cameras over time").get_by_role("img")
+    charts = curves.get_by_role("img")
+    expect(charts).to_have_count(0)
+    curves.get_by_role("button", name="Curves").click()
     expect(charts).to_have_count(5)
     charts.first.locator(".u-over").click()
     assert page.locator(".film__time").inner_text().split("frame ")[1].startswith("3")
@@ -218,6 +221,35 @@ def test_the_page_is_usable_by_everybody_and_fits(recording: int, open_page: Ope
     expect(dialog).to_contain_text("Next frame that is bridged or lost")
 
 
+@pytest.mark.parametrize(("width", "height"), [(390, 800), (700, 900), (800, 1000), (720, 450)])
+def test_the_picture_of_a_tracked_shot_stands_above_the_strip_in_a_narrow_window(
+    recording: int, open_page: OpenPage, width: int, height: int
+) -> None:
+    page = tracked(open_page, recording)
+    resize(page, width, height)
+    boxes = []
+    for name in (".film__picture", ".film__strip", ".camera__curves", ".film__rail"):
+        box = page.locator(name).bounding_box()
+        assert box is not None and box["height"] > 50, name
+        boxes.append((box["y"], box["y"] + box["height"]))
+    assert all(end < start for (_, end), (start, _) in pairwise(boxes))
+    assert page.locator(".film__rail").evaluate("it => it.scrollHeight === it.clientHeight")
+    page.keyboard.press("ArrowRight")
+    shows(page, 1)
+    box = page.locator(".film__picture").bounding_box()
+    assert box is not None and box["y"] == boxes[0][0]
+
+
+def test_the_picture_has_one_size_in_every_frame(recording: int, open_page: OpenPage) -> None:
+    page = tracked(open_page, recording)
+    heights = set()
+    for frame in range(LAST + 1):
+        shows(page, frame)
+        heights.add(page.locator(".film__picture").evaluate("it => it.clientHeight"))
+        page.keyboard.press("ArrowRight")
+    assert len(heights) == 1
+
+
 def test_the_pitch_that_a_shot_shows_is_taken_for_its_match(
     recording: int, open_page: OpenPage
 ) -> None:
@@ -292,6 +324,34 @@ def linked(page: Page, recording: int) -> int:
 
 class TestBegunBefore:
     """A page that is opened, or loaded again, shows what is at work on it, and can end it."""
+
+    def test_a_job_on_one_shot_leaves_the_others_to_be_tracked(
+        self, recording: int, open_page: OpenPage
+    ) -> None:
+        page = open_page(f"/recordings/{recording}")
+        shows(page, 0)
+        linked(page, recording)
+        here = f"/api/v1/recordings/{recording}"
+        tracking = [queued(page, f"{here}/cameras", {"first": 0, "last": 3}) for _ in range(4)]
+        page.reload()
+        shows(page, 0)
+        button = page.get_by_role("button", name="Track this shot")
+        expect(button).to_have_attribute("title", "A job is running on this shot")
+        page.keyboard.press("ArrowDown")
+        shows(page, 4)
+        expect(button).to_have_attribute("aria-disabled", "false")
+        ends_all(page, tracking)
+
+    def test_all_shots_are_tracked_by_one_button(self, recording: int, open_page: OpenPage) -> None:
+        page = open_page(f"/recordings/{recording}")
+        shows(page, 0)
+        linked(page, recording)
+        page.reload()
+        shows(page, 0)
+        page.get_by_role("button", name="Track all 2 shots without cameras").click()
+        here = f"/api/v1/recordings/{recording}/cameras"
+        until(page, lambda: len(page.request.get(here).json()["items"]) == 2)
+        expect(page.get_by_role("button", name="Track all")).to_have_count(0)
 
     def test_a_recording_shows_tracking_shots_and_groups(
         self, recording: int, open_page: OpenPage

@@ -35,7 +35,7 @@ function Counts({ stretch: { summary, before }, old }) {
 
 /** @param {{one: RecordingJson, cameras: Cameras}} props */
 export function CameraCard({ one, cameras }) {
-	const { stretch, frames, job, error, busy, before } = cameras;
+	const { stretch, frames, job, error, busy, before, missing } = cameras;
 	const fresh = stretch ? stretch.drawn.filter((frame) => !stretch.summary.annotated.includes(frame)) : [];
 	const useless = stretch?.summary.unusable ?? [];
 	const shown = stretch?.summary.pitch;
@@ -56,6 +56,7 @@ export function CameraCard({ one, cameras }) {
 				<button class="button ${stretch && !fresh.length ? '' : 'button--primary'}" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy} onClick=${cameras.track}>${stretch ? 'Track again' : 'Track this shot'} <kbd>T</kbd></button>
 				<button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy || 'Makes a group of this frame and opens it in the calibration editor'} onClick=${cameras.correct}>Draw lines <kbd>E</kbd></button>
 				${stretch ? html`<button class="button" type="button" aria-pressed=${stretch.summary.turned} data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy || 'The painted lines look the same from both sides of the pitch. Use this for a camera that stands opposite the main camera'} onClick=${cameras.turnHalf}>Turn to the other side <kbd>Shift T</kbd></button>` : null}
+				${missing > 1 ? html`<button class="button" type="button" data-needs="lead" data-of=${one.dataset} title="Shots of the main camera and replays that have no cameras, except dropped ones" onClick=${cameras.trackAll}>Track all ${missing} shots without cameras</button>` : null}
 			</p>
 			${stretch ? html`
 				<p class="camera__files">Save as ${FILES.map(([format, label], index) => html`${index ? ', ' : ''}<a key=${format} class="link" href=${camerasFile(one.id, stretch.first, format)} download>${label}</a>`)}</p>` : null}

@@ -4,6 +4,7 @@
 import { html } from 'htm/preact';
 import { useMemo } from 'preact/hooks';
 
+import { stored } from '../../lib/storage.js';
 import { markingsPath, OUTCOMES, runsOf } from '../../state/cameras.js';
 import { goTo, seen, wanted } from '../../state/playback.js';
 import { Chart, Numbers } from '../chart.js';
@@ -13,6 +14,8 @@ import { Chart, Numbers } from '../chart.js';
 /** @import {Curve} from '../chart.js' */
 
 const HEIGHT = 84;
+/** Whether the curves are drawn, which takes height from the picture. */
+const curvesShown = stored('camera curves', false);
 const [PAN, TILT, FOCAL] = [3, 4, 6];
 
 /** @type {Record<string, string>} */
@@ -64,7 +67,7 @@ const two = (value) => value.toFixed(2);
 const whole = (value) => value.toFixed(0);
 
 /** The frame on screen, in words. @param {{cameras: Cameras}} props */
-function ThisFrame({ cameras: { frames } }) {
+function ThisFrame({ cameras: { frames, before } }) {
 	const place = frames ? wanted.value - frames.first : -1;
 	if (!frames || place < 0 || place >= frames.outcome.length) return null;
 	const { name, meaning } = OUTCOMES[frames.outcome[place]];
@@ -72,7 +75,8 @@ function ThisFrame({ cameras: { frames } }) {
 	const reason = frames.reason[place];
 	const key = frames.keyframe.includes(wanted.value) ? ' Key frame.' : '';
 	const more = error === null ? `${reason ? `: ${REASONS[reason] ?? reason.replaceAll('_', ' ')}` : `: ${meaning}`}.` : `: the painted lines lie ${error.toFixed(2)} px from the projected ones.`;
-	return html`<p class="camera__frame">Frame ${wanted.value} is <strong>${name}</strong>${more}${key}</p>`;
+	const old = before ? ' These are the cameras before the last change.' : '';
+	return html`<p class="camera__frame" title=${`Frame ${wanted.value} is ${name}${more}${key}${old}`}>Frame ${wanted.value} is <strong>${name}</strong>${more}${key}<strong>${old}</strong></p>`;
 }
 
 /** What leads through the frames of the shot. @param {{cameras: Cameras}} props */
@@ -83,8 +87,8 @@ function Tools({ cameras }) {
 			<button class="button button--small" type="button" title="The next frame that is bridged or lost" onClick=${cameras.untracked}>Next untracked frame <kbd>N</kbd></button>
 			<button class="button button--small" type="button" aria-pressed=${cameras.lines} onClick=${cameras.turnLines}>Projected lines <kbd>P</kbd></button>
 			${cameras.stretch?.before ? html`<button class="button button--small" type="button" aria-pressed=${cameras.before} onClick=${cameras.turnBefore}>Previous cameras <kbd>B</kbd></button>` : null}
+			<button class="button button--small" type="button" aria-pressed=${curvesShown.value} title="Error, pan, tilt and zoom of each frame" onClick=${() => { curvesShown.value = !curvesShown.value; }}>Curves</button>
 			<${ThisFrame} cameras=${cameras} />
-			${cameras.before ? html`<strong>These are the cameras before the last change.</strong>` : null}
 		</div>
 	`;
 }
@@ -92,18 +96,19 @@ function Tools({ cameras }) {
 /** @param {{cameras: Cameras}} props */
 export function CameraCurves({ cameras }) {
 	const { frames } = cameras;
-	const charts = useMemo(() => frames && chartsOf(frames), [frames]);
-	if (!frames || !charts) return null;
+	const charts = useMemo(() => (frames && curvesShown.value ? chartsOf(frames) : null), [frames, curvesShown.value]);
+	if (!frames) return null;
 	const frame = wanted.value;
 	return html`
 		<section class="card camera__curves" aria-label="Cameras over time">
 			<${Tools} cameras=${cameras} />
 			<${Outcomes} frames=${frames} />
-			<div class="camera__charts">
-				${charts.map((chart) => html`
-					<${Chart} key=${chart.yLabel} ...${chart} compact=${true} height=${HEIGHT} marker=${frame} onPick=${(/** @type {number} */ index) => goTo(frames.first + index)} />`)}
-			</div>
-			<${Numbers} x=${charts[0].x} xLabel="frame" curves=${charts.flatMap(({ curves }) => curves)} format=${two} />
+			${charts ? html`
+				<div class="camera__charts">
+					${charts.map((chart) => html`
+						<${Chart} key=${chart.yLabel} ...${chart} compact=${true} height=${HEIGHT} marker=${frame} onPick=${(/** @type {number} */ index) => goTo(frames.first + index)} />`)}
+				</div>
+				<${Numbers} x=${charts[0].x} xLabel="frame" curves=${charts.flatMap(({ curves }) => curves)} format=${two} />` : null}
 		</section>
 	`;
 }

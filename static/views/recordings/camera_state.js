@@ -8,6 +8,7 @@ import { listen } from '../../api/events.js';
 import { getPitches, setPitch } from '../../api/match_estimates.js';
 import { postInstants } from '../../api/recordings.js';
 import { useAttempt } from '../../lib/attempt.js';
+import { plural } from '../../lib/format.js';
 import { useKeys } from '../../lib/hooks.js';
 import { pitchSize } from '../../lib/pitch_size.js';
 import { useResource } from '../../lib/resource.js';
@@ -19,7 +20,7 @@ import { goTo, wanted } from '../../state/playback.js';
 import { useEnded } from '../running_jobs.js';
 
 /** @import {FrameCamerasJson, ShotCamerasJson} from '../../api/cameras.js' */
-/** @import {JobJson} from '../../api/jobs.js' */
+/** @import {JobJson, JobSubject} from '../../api/jobs.js' */
 /** @import {ApiError} from '../../api/problem.js' */
 /** @import {RecordingJson, Shot} from '../../api/recordings.js' */
 /** @import {Binding} from '../../lib/keys.js' */
@@ -35,6 +36,8 @@ import { useEnded } from '../running_jobs.js';
  * @property {ApiError | null} error
  * @property {string} busy why nothing can be begun
  * @property {() => void} track
+ * @property {number} missing shots of the main camera and replays without cameras
+ * @property {() => void} trackAll of these
  * @property {() => void} correct draw the lines of the frame on screen
  * @property {() => void} turnHalf to the other side of the pitch, or back
  * @property {() => void} takePitch give the match the pitch that the frames show, and track again
@@ -46,37 +49,48 @@ import { useEnded } from '../running_jobs.js';
 
 const NO_CAMERAS = 'This shot has no cameras yet.';
 
-/** @param {RecordingJson} one @param {Shot | undefined} shot @param {RunningJobs} running on the recording @returns {Cameras} */
-export function useCameras(one, shot, { jobs, watch }) {
+/** Whether two share a frame. @param {JobSubject | {first: number, last: number} | null} a a job may say neither: it works on all @param {{first: number, last: number}} b */
+const overlaps = (a, b) => (a?.first ?? 0) <= b.last && b.first <= (a?.last ?? Infinity);
+
+/** @param {RecordingJson} one @param {Shot[]} shots @param {Shot | undefined} shot that is shown @param {RunningJobs} running on the recording @returns {Cameras} */
+export function useCameras(one, shots, shot, { jobs, watch }) {
 	const list = useResource((signal) => getCameraStretches(one.id, signal), [one.id]);
 	const [before, setBefore] = useState(false);
 	const [lines, setLines] = useState(true);
 	const [drawing, setDrawing] = useState(-1);
-	const { error, attempt } = useAttempt();
+	const { error, busy: asking, attempt } = useAttempt();
 	const frame = wanted.value;
 	const stretch = list.value?.items.find(({ first, last }) => first <= frame && frame <= last) ?? null;
 	const old = before && stretch?.before !== null;
 	const [id, revision] = [stretch?.first ?? -1, stretch?.revision ?? 0];
 	const found = useResource(async (signal) => (id < 0 ? null : getFrameCameras(one.id, id, old, signal)), [one.id, id, revision, old]);
 	const tracking = jobs.filter(({ kind }) => kind === 'track');
-	const here = tracking.filter(({ subject }) => shot && (subject?.first ?? 0) <= shot.last && shot.first <= (subject?.last ?? Infinity));
+	// What is tracked as one is tracked again as one.
+	const asked = shot && stretch && stretch.first <= shot.first && shot.last <= stretch.last ? stretch : shot;
+	const here = tracking.filter(({ subject }) => asked && overlaps(subject, asked));
 	// Of several the one that works on the shot on screen.
 	const job = jobToShow(here.some((one) => !isOver(one)) || tracking.every(isOver) ? here : tracking);
 	useEnded(tracking, list.reload);
 	useEffect(() => listen('job', () => {}, list.reload), [one.id]);
-	const busy = jobs.some((one) => !isOver(one) && (one.kind === 'track' || one.id === drawing)) ? 'A job is running' : shot ? '' : 'This recording has no shot';
+	const busy = here.some((one) => !isOver(one)) ? 'A job is running on this shot' : jobs.some((one) => !isOver(one) && one.id === drawing) ? 'A job is running' : shot ? '' : 'This recording has no shot';
+	const missing = shots.filter((shot) => (shot.kind === 'main' || shot.kind === 'replay') && shot.kept !== false
+		&& !list.value?.items.some((item) => overlaps(item, shot)) && !tracking.some((job) => !isOver(job) && overlaps(job.subject, shot)));
 	/** Whether nothing can be begun, which is said. */
 	function isBusy() {
 		if (busy) explain(`${busy}.`);
 		return busy !== '';
 	}
 	function track() {
-		if (isBusy() || !shot) return;
-		const asked = stretch && stretch.first <= shot.first && shot.last <= stretch.last ? stretch : shot;
+		if (isBusy() || !asked) return;
 		attempt(postCameras(one.id, asked), async (begun) => {
 			const over = await watch(begun);
 			if (over.state === 'done') announce(over.sentence ?? 'The shot is tracked.');
 		});
+	}
+	function trackAll() {
+		if (asking) return;
+		const jobs = missing.map(async (shot) => { watch(await postCameras(one.id, shot)); });
+		attempt(Promise.all(jobs), () => announce(`${plural(missing.length, 'shot')} will be tracked, one after the other.`));
 	}
 	function turnHalf() {
 		if (isBusy()) return;
@@ -117,15 +131,16 @@ export function useCameras(one, shot, { jobs, watch }) {
 		});
 	}
 	const frames = id < 0 || found.waiting && found.value?.first !== id ? null : found.value;
-	/** @param {number | null | undefined} place @param {string} none */
-	const jump = (place, none) => {
+	/** @param {number | null | undefined} place @param {string} none @param {string} here where it is the frame on screen */
+	const jump = (place, none, here) => {
 		if (place === null || place === undefined) explain(none);
+		else if (place === wanted.value) explain(here);
 		else goTo(place);
 	};
 	return {
-		stretch, frames, before: old, lines, job, error: error ?? found.error ?? list.error, busy, track, correct, turnHalf, takePitch,
-		worst: () => jump(frames && worstFrame(frames), 'No frame is tracked.'),
-		untracked: () => jump(frames && nextUntracked(frames, wanted.value), frames ? 'Every frame is tracked.' : NO_CAMERAS),
+		stretch, frames, before: old, lines, job, error: error ?? found.error ?? list.error, busy, track, missing: list.value ? missing.length : 0, trackAll, correct, turnHalf, takePitch,
+		worst: () => jump(frames && worstFrame(frames), 'No frame is tracked.', 'This is the worst frame.'),
+		untracked: () => jump(frames && nextUntracked(frames, wanted.value), frames ? 'Every frame is tracked.' : NO_CAMERAS, 'No other frames of this shot are bridged or lost.'),
 		turnBefore: () => {
 			if (!stretch?.before) { explain('This shot has no previous cameras.'); return; }
 			setBefore(!old);

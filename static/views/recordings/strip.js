@@ -62,7 +62,13 @@ function Bar({ one, shots, chosen, balls, goTo }) {
 function Item({ one, shot, index, current, go }) {
 	const ref = useRef(/** @type {HTMLButtonElement | null} */ (null));
 	const fps = one.fps ?? 25;
-	useEffect(() => { if (current) ref.current?.scrollIntoView({ block: 'nearest', inline: 'nearest' }); }, [current]);
+	useEffect(() => {
+		const list = ref.current?.closest('.film__shots');
+		if (!current || !ref.current || !list) return;
+		// Only the list moves: where the page scrolls, the picture stays in sight.
+		const [item, seen] = [ref.current.getBoundingClientRect(), list.getBoundingClientRect()];
+		list.scrollLeft += Math.min(item.left - seen.left, 0) + Math.max(item.right - seen.right, 0);
+	}, [current]);
 	const middle = Math.floor((shot.first + shot.last) / 2);
 	return html`
 		<li>
