@@ -145,7 +145,12 @@ def follow_ball(
                 break
             if each in clicks:
                 break
-        ways.append(way.balls(max(len(lead) - 1, 0)))
+        balls = way.balls(max(len(lead) - 1, 0))
+        goal = next((one for one in wanted if one in clicks), wanted[-1] if wanted else number)
+        if end == "limit" and (balls[-1].frame if balls else number) != goal:
+            # Its last frames do not show it.
+            end = "lost"
+        ways.append(balls)
         ends.append(end)
     return BallRun((click,), (*reversed(ways[0]), first, *ways[1]), *ends)
 

@@ -126,8 +126,8 @@ class BallRun:
     Attributes:
         clicks: What people said, by frame.
         balls: Where the ball is, each frame once and in their order; frames between that have none are lost.
-        before, after: Why there are no more to either side: the ball was ``lost``, it ``left`` the picture, or no
-            further frames were asked for (``limit``).
+        before, after: Why there are no more to either side: the ball was ``lost`` or not seen in the last frames that
+            were asked for, it ``left`` the picture, or no further frames were asked for (``limit``).
     """
 
     clicks: tuple[BallClick, ...]

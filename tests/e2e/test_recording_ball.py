@@ -82,10 +82,33 @@ def test_one_click_follows_and_keys_accept_and_take_back(
     expect(card).to_contain_text("confirmed")
     page.keyboard.press("y")
     expect(card).to_contain_text("the ball was added to 2 views")
+    page.keyboard.press("Delete")
+    expect(card.get_by_role("button", name="Delete the accepted ball?")).to_be_visible()
     page.keyboard.press("u")
     expect(card).not_to_contain_text("Accepted")
     page.keyboard.press("Delete")
+    expect(card.get_by_role("button", name="Delete the corrected ball?")).to_be_visible()
+    page.keyboard.press("Delete")
     expect(card).to_contain_text("Click the ball in the picture")
+
+
+def test_a_click_while_it_plays_follows_from_the_frame_that_was_seen(
+    recording: int, open_page: OpenPage
+) -> None:
+    page = open_page(f"/recordings/{recording}")
+    shows(page, 0)
+    # The next frames never come: the page is waiting for one, as in playback.
+    page.route("**/frames/**", lambda route: None)
+    page.keyboard.press("l")
+    expect(page.locator(".film__coming")).to_be_visible()
+    frame = int(page.locator(".ball__layer").get_attribute("data-frame") or "")
+    click(page, frame)
+    card = page.get_by_role("region", name="Ball", exact=True)
+    expect(card).to_contain_text(f"frames 0 to {FRAMES - 1}", timeout=120_000)
+    (run,) = page.request.get(f"/api/v1/recordings/{recording}/ball-runs").json()["items"]
+    found = page.request.get(f"/api/v1/recordings/{recording}/ball-runs/{run['id']}").json()
+    assert [clicked["frame"] for clicked in found["clicks"]] == [frame]
+    expect(page.get_by_role("button", name="Play Space")).to_be_visible()
 
 
 def test_a_cross_clicks_by_keyboard(recording: int, open_page: OpenPage) -> None:

@@ -13,11 +13,15 @@ from app.db.json_columns import (
     parse_json_column,
     translate_shape_errors_to_damage,
 )
+from app.soccer.annotation import BallAnnotation
 from app.soccer.codec import digest_json
+from app.soccer.frames import Box, ImagePoint
 from app.tracking.ball_run import BallClick, BallRun, FollowedBall
 
 _COLUMNS = {"x": 3, "y": 3, "diameter": 3, "sigma_px": 3, "confidence": 3}
 _STATES = {"f": "followed", "u": "uncertain"}
+ACCEPTING, REMOVING = "accepting", "removing"
+"""What is being done to a run: with the revision that the request for it named."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +34,7 @@ class StoredRun:
         accepted_by: Who accepted it; None: nobody.
         stale: Whether the video is another one by now.
         sha256: Of the video that it is of.
-        groups: What accepting did: views that got the ball (``placed``), that had one already (``kept``), and that could
+        groups: What accepting did: views that got the ball (``placed``, also those that were made since), that had one already (``kept``), and that could
             not be edited (``refused``); after an attempt to take it back those that it is still in. While it is
             accepted or taken back, the revision of before is there as ``accepting`` or ``removing``.
     """
@@ -62,6 +66,11 @@ class StoredRun:
             for ball in self.run.balls
             if ball.state == "followed" or ball.frame in sure
         }
+
+    def make_annotation(self, ball: FollowedBall) -> BallAnnotation:
+        """What views that show a frame of it get."""
+        box = Box.square(ImagePoint(ball.x, ball.y), ball.diameter)
+        return BallAnnotation(box=box, predicted_by=self.ball_source_name)
 
 
 def build_run_from_row(row: Any, sha256: str | None) -> StoredRun:

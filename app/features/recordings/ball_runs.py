@@ -17,12 +17,14 @@ from app.features.groups.edit import Edit, SetBalls
 from app.features.groups.queries import read_groups
 from app.features.groups.state import read_etags, require_etag
 from app.features.groups.view_paint import PaintUpdater
-from app.features.recordings.ball_run_values import StoredRun as StoredRun
 from app.features.recordings.ball_run_values import (
+    ACCEPTING,
+    REMOVING,
     build_run_from_row,
     make_run_etag,
     run_to_columns,
 )
+from app.features.recordings.ball_run_values import StoredRun as StoredRun
 from app.features.recordings.follow import EACH_WAY, BallFollower, collect_follow_hints
 from app.features.recordings.queries import (
     delete_ball_run,
@@ -36,12 +38,9 @@ from app.features.recordings.service import Recording, require_recording
 from app.features.recordings.shots import get_shots
 from app.json_text import canonical_json_text
 from app.soccer.annotation import BallAnnotation
-from app.soccer.frames import Box, ImagePoint
-from app.tracking.ball_run import BallClick, BallRun, FollowedBall
+from app.tracking.ball_run import BallClick, BallRun
 
 _BATCH = 100
-_ACCEPTING, _REMOVING = "accepting", "removing"
-"""What is being done to a run: with the revision that the request for it named."""
 
 
 @dataclass(frozen=True)
@@ -231,7 +230,7 @@ def _reserve_review(
     that what others do then to the run that they see is refused. What a server did not finish, the same request does.
     """
     run = _require_ball_run(session, recording_id, run_id)
-    doing = _ACCEPTING if change.accepted else _REMOVING
+    doing = ACCEPTING if change.accepted else REMOVING
     begun = run.groups.get(doing)
     is_mine = not change.accepted or run.accepted_by == actor
     if begun is not None and is_mine and make_run_etag(run.id, begun, run.created) == if_match:
@@ -333,7 +332,7 @@ def _apply_run_to_views(
                 balls = next(
                     one.balls for one in groups[view.group].group.views if one.key == view.key
                 )
-                mine = _make_annotation(run, trusted[view.number])
+                mine = run.make_annotation(trusted[view.number])
                 if accepted and balls and balls != (mine,):
                     counts["kept"] += 1
                     continue
@@ -352,11 +351,6 @@ def _apply_run_to_views(
 
 def _make_set_balls_edit(view: str, balls: tuple[BallAnnotation, ...]) -> Sequence[Edit]:
     return [SetBalls(view, balls)]
-
-
-def _make_annotation(run: StoredRun, ball: FollowedBall) -> BallAnnotation:
-    box = Box.square(ImagePoint(ball.x, ball.y), ball.diameter)
-    return BallAnnotation(box=box, predicted_by=run.ball_source_name)
 
 
 def _require_unaccepted_and_unchanged(run: StoredRun, if_match: str) -> None:

@@ -21,6 +21,11 @@ from app.errors import ImageError, InputError, StorageError
 from app.features.file_tools.track import frame_to_row
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.imports.ingest import BATCH, ImportContext, IngestReport, import_group_chunk
+from app.features.recordings.accepted_balls import (
+    NewGroup,
+    RecordedFrame,
+    add_accepted_balls,
+)
 from app.features.recordings.cameras import SOURCE, read_cameras_of_frames
 from app.features.recordings.index import read_index
 from app.features.recordings.link_frames import find_linked_frames
@@ -163,7 +168,7 @@ def make_groups_of_instants(
     groups = _build_groups(store, live, replays.of, there)
     while not dry_run and (batch := list(islice(groups, BATCH))):
         with store.write() as session:
-            import_group_chunk(session, origin, batch, report, set())
+            import_group_chunk(session, origin, add_accepted_balls(session, batch), report, set())
         done += len(batch)
         progress(done, total)
     linked_views = [view for number in wanted for view in replays.of.get(number, ())]
@@ -234,7 +239,7 @@ def _build_groups(
     live: Sequence[_ShownFrame],
     linked: Mapping[int, Sequence[_ShownFrame]],
     there: Mapping[int, int],
-) -> Iterator[Group]:
+) -> Iterator[NewGroup]:
     """Groups of live frames with further views of replays; those that are there keep the views that they have."""
     settings = store.settings
     for start in range(0, len(live), BATCH):
@@ -248,8 +253,11 @@ def _build_groups(
             match = one.recording.name
             key = f"{match}/{one.number}.png"
             stored = known.get(there.get(one.number, 0))
+            new = dict[str, RecordedFrame]()
             if stored is None:
-                views = [_build_view(settings, one, f"{one.number}.png", key)]
+                name = f"{one.number}.png"
+                views = [_build_view(settings, one, name, key)]
+                new[name] = RecordedFrame(one.recording, one.number)
             else:
                 views = [_strip_edits_from_view(stored, view, one) for view in stored.group.views]
             for other in linked.get(one.number, ()):
@@ -258,7 +266,9 @@ def _build_groups(
                     name = f"{other.recording.name}_{name}"
                 if all(name != view.key for view in views):
                     views.append(_build_view(settings, other, name, f"{key}/{name}"))
-            yield Group(key, tuple(views), match=match, label=f"Frame {one.number}")
+                    new[name] = RecordedFrame(other.recording, other.number)
+            group = Group(key, tuple(views), match=match, label=f"Frame {one.number}")
+            yield NewGroup(group, new)
 
 
 def _strip_edits_from_view(stored: StoredGroup, view: View, live: _ShownFrame) -> View:

@@ -242,7 +242,9 @@ def _build_contradictions(detail: TrackedFrames) -> list[ContradictionDocument]:
         group = detail.groups.get(item.frame)
         x, y = item.place or (None, None)
         fix = (
-            f"Look at {item.view}: move its ball, or leave the view out."
+            "No group shows this frame. Click the followed ball again in its recording, or withdraw it."
+            if group is None
+            else f"Look at {item.view}: move its ball, or leave the view out."
             if x is None
             else f"Move the ball of {item.view} to ({x:.1f}, {y:.1f}) if it is there, pick the "
             "other ball if it shows two, or leave the view out."

@@ -10,6 +10,7 @@ import { cameraAt } from '../../state/cameras.js';
 import { goTo, seen, wanted } from '../../state/playback.js';
 import { whyNot } from '../../state/rights.js';
 import { FormError } from '../form_error.js';
+import { NO_VIEW } from './ball_state.js';
 
 /** @import {BallRunFrames, BallRunJson} from '../../api/ball_runs.js' */
 /** @import {RecordingJson, Shot} from '../../api/recordings.js' */
@@ -42,7 +43,7 @@ export function BallOverlay({ one, balls, cameras: { frames } }) {
 	/** @param {MouseEvent} event */
 	function click(event) {
 		const at = placeOf(one, event);
-		if (at && frame === wanted.value) balls.click(at);
+		if (at && frame >= 0) balls.click(at, frame);
 	}
 	const pointed = balls.cross ?? over;
 	const camera = frames && frame >= frames.first && frame <= frames.last ? cameraAt(frames, frame) : null;
@@ -90,10 +91,16 @@ export function BallBand({ runs, all = [], first, frames }) {
 	`;
 }
 
-/** Why a run goes no further. @param {'lost' | 'left' | 'limit'} why @param {boolean} isEdge whether it reaches the edge of its shot @param {string} edge */
-function endText(why, isEdge, edge) {
+/** Why a run goes no further. @param {'lost' | 'left' | 'limit'} why @param {boolean} isEdge whether it reaches the edge of its shot @param {string} edge @param {number} frames from the outermost click */
+function endText(why, isEdge, edge, frames) {
 	if (why !== 'limit') return ENDS[why];
-	return isEdge ? `to the ${edge} of the shot` : 'for 250 frames';
+	return isEdge ? `to the ${edge} of the shot` : `for ${plural(frames, 'frame')}`;
+}
+
+/** The views that have an accepted ball, in words. @param {BallRunFrames} run */
+function viewsText({ placed, kept }) {
+	if (!placed && !kept) return `. ${NO_VIEW}`;
+	return `: the ball was added to ${plural(placed ?? 0, 'view')}${kept ? `; ${plural(kept, 'view')} already had one and ${kept === 1 ? 'keeps' : 'keep'} it` : ''}.`;
 }
 
 /** @param {{one: RecordingJson, shot: Shot | undefined, balls: Balls}} props */
@@ -120,7 +127,7 @@ export function BallCard({ one, shot, balls }) {
 		<section class="card ball" aria-label="Ball" aria-busy=${busy}>
 			<h2>Ball${run ? html`<span class="card__aside">frames ${run.first} to ${run.last}</span>` : null}</h2>
 			${run ? html`
-				<p>${accepted ? html`<strong>Accepted</strong> by ${run.accepted_by}: the ball was added to ${plural(run.placed ?? 0, 'view')}${run.kept ? `; ${plural(run.kept, 'view')} already had one and ${run.kept === 1 ? 'keeps' : 'keep'} it` : ''}. ` : null}Followed backwards ${endText(run.before, run.first === shot?.first, 'beginning')}, forwards ${endText(run.after, run.last === shot?.last, 'end')}. ${left ? `${plural(left, 'frame')} uncertain.` : 'No frame is uncertain.'}</p>
+				<p>${accepted ? html`<strong>Accepted</strong> by ${run.accepted_by}${viewsText(run)} ` : null}Followed backwards ${endText(run.before, run.first === shot?.first, 'beginning', run.clicks[0].frame - run.first)}, forwards ${endText(run.after, run.last === shot?.last, 'end', run.last - (run.clicks.at(-1)?.frame ?? run.last))}. ${left ? `${plural(left, 'frame')} uncertain.` : 'No frame is uncertain.'}</p>
 				<p data-ball-state=${ball?.state ?? 'lost'}>${ball ? html`Frame ${wanted.value}: <strong>${WORDS[ball.state]}</strong>, ${ball.diameter.toFixed(1)} px wide, centre ± ${ball.sigma.toFixed(1)} px, ${clicked ? 'clicked here' : `${Math.round(100 * ball.confidence)} % sure`}.` : html`Frame ${wanted.value}: <strong>lost</strong>. Click the ball where it is seen.`}</p>
 				${run.stale ? html`<p class="form__error">The video file has changed since then.</p>` : null}`
 			: html`<p>${runs.length ? 'No ball is followed in this frame. ' : ''}Click the ball in the picture: it is followed forwards and backwards until it is lost.</p>`}
@@ -135,7 +142,7 @@ export function BallCard({ one, shot, balls }) {
 				<button class="button" type="button" aria-disabled=${runs.length === 0} title=${runs.length ? '' : 'No ball is followed in this shot'} onClick=${balls.next}>Next uncertain <kbd>V</kbd></button>
 				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${why !== '' || sure !== '' || accepted} title=${why || sure || 'Confirm that these uncertain frames are right'} onClick=${balls.confirm}>Confirm <kbd>O</kbd></button>
 				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-pressed=${balls.cross !== null} title="Shows a cross that the arrow keys move; Enter follows the ball from there" onClick=${balls.turnCross} onKeyDown=${enter}>Cross <kbd>F</kbd></button>
-				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${why !== ''} title=${why} onClick=${balls.remove}>Delete <kbd>Del</kbd></button>
+				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${why !== ''} title=${why} aria-live="polite" onBlur=${balls.keep} onClick=${(/** @type {MouseEvent} */ event) => { if (event.detail < 2) balls.remove(); }}>${balls.question || 'Delete'} <kbd>Del</kbd></button>
 			</div>
 			<p role="status">${busy ? 'Following the ball…' : ''}</p>
 			${error ? html`<${FormError} error=${error} />` : null}

@@ -27,12 +27,15 @@ import { goTo, stand, wanted } from '../../state/playback.js';
  * @property {Place | null} cross where Enter clicks; null while nobody clicks by keyboard
  * @property {boolean} busy whether a ball is being followed
  * @property {ApiError | null} error
- * @property {(at: Place) => void} click
+ * @property {(at: Place, frame?: number) => void} click of the frame on screen, if none is named
  * @property {() => void} accept
  * @property {() => void} takeBack
  * @property {() => void} confirm
  * @property {() => void} next
- * @property {() => void} remove
+ * @property {string} question whether the run shall be deleted, which has been asked; '' if not
+ * @property {() => void} remove the run; one that is accepted or has several clicks when it is asked again
+ * @property {() => void} keep forget the question
+ * @property {() => void} reload
  * @property {() => void} turnCross
  * @property {(x: number, y: number, event: KeyboardEvent) => void} moveCross
  */
@@ -44,6 +47,8 @@ const STEPS = { plain: 8, Shift: 40, Alt: 1 };
 
 const BUSY = 'The ball is being followed.';
 const NONE = 'No ball is followed in this frame.';
+/** Said of an accepted ball that no group has. */
+export const NO_VIEW = 'No group has these frames yet. Make groups of them: they get the ball.';
 
 /** @param {BallRunJson} run */
 const tag = ({ id, etag }) => `${id} ${etag}`;
@@ -52,6 +57,7 @@ const tag = ({ id, etag }) => `${id} ${etag}`;
 export function useBalls(one, shot) {
 	const list = useResource((signal) => getBallRuns(one.id, signal), [one.id]);
 	const [cross, setCross] = useState(/** @type {Place | null} */ (null));
+	const [doomed, setDoomed] = useState('');
 	const { error, busy: asking, attempt } = useAttempt();
 	const known = useRef(/** @type {Map<string, BallRunFrames>} */ (new Map()));
 	const all = list.value?.items ?? [];
@@ -67,6 +73,7 @@ export function useBalls(one, shot) {
 	const frame = wanted.value;
 	const run = runAt(runs, frame);
 	useEffect(() => { setCross(null); }, [one.id]);
+	useEffect(() => { setDoomed(''); }, [frame]);
 	// Begun before the page was opened, or by somebody else.
 	const elsewhere = list.value?.following ?? [];
 	useEffect(() => {
@@ -81,14 +88,17 @@ export function useBalls(one, shot) {
 		list.reload();
 		announce(told(done));
 	});
-	/** @param {Place} at */
-	function click(at) {
+	/** @param {Place} at @param {number} [where] */
+	function click(at, where = frame) {
 		if (busy) explain(BUSY);
 		if (busy || list.waiting) return;
 		stand();
-		const said = { frame, x: at.x, y: at.y };
+		// A picture that is behind what is wanted is the one that was clicked.
+		if (where !== frame) goTo(where);
+		const said = { frame: where, x: at.x, y: at.y };
 		setCross(null);
-		const open = run && !run.accepted_by ? run : null;
+		const there = runAt(runs, where);
+		const open = there && !there.accepted_by ? there : null;
 		ask(open ? postBallClick(one.id, open, said) : postBallRun(one.id, said), ({ first, last, uncertain }) => (
 			`The ball is followed from frame ${first} to ${last}; ${uncertain ? `${plural(uncertain, 'frame')} uncertain` : 'no frame is uncertain'}.`
 		));
@@ -99,7 +109,7 @@ export function useBalls(one, shot) {
 		else if (!run) explain(NONE);
 		else if (Boolean(run.accepted_by) === accepted) explain(accepted ? 'This ball has been accepted already.' : 'Nothing to withdraw: this ball has not been accepted.');
 		else ask(patchBallRun(one.id, run, { accepted }), ({ placed, kept, refused }) => (accepted
-			? `Accepted: the ball was added to ${plural(placed ?? 0, 'view')}${kept ? `; ${plural(kept, 'view')} already had one` : ''}${refused ? `; ${plural(refused, 'view')} could not be edited` : ''}.`
+			? !placed && !kept && !refused ? `Accepted. ${NO_VIEW}` : `Accepted: the ball was added to ${plural(placed ?? 0, 'view')}${kept ? `; ${plural(kept, 'view')} already had one` : ''}${refused ? `; ${plural(refused, 'view')} could not be edited` : ''}.`
 			: refused ? `Not withdrawn: ${plural(refused, 'view')} could not be edited. Withdraw it again.` : 'Withdrawn: the balls that accepting added are removed.'));
 	}
 	function confirm() {
@@ -109,19 +119,28 @@ export function useBalls(one, shot) {
 		else if (!around.length) explain('There is nothing to confirm at this frame.');
 		else ask(patchBallRun(one.id, run, { confirmed: [...run.confirmed, ...around] }), () => `${plural(around.length, 'frame')} confirmed.`);
 	}
+	// What a person has said of it.
+	const worth = run && (run.accepted_by ? 'Delete the accepted ball?' : run.clicks.length > 1 || run.confirmed.length ? 'Delete the corrected ball?' : '');
 	function remove() {
 		if (busy) explain(BUSY);
 		else if (!run) explain(NONE);
-		else attempt(deleteBallRun(one.id, run.id), () => { list.reload(); announce('The followed ball is deleted.'); });
+		else if (worth && doomed !== tag(run)) {
+			setDoomed(tag(run));
+			explain('Press Delete again to delete this ball. It cannot be undone.');
+		} else attempt(deleteBallRun(one.id, run.id), () => { list.reload(); announce('The followed ball is deleted.'); });
 	}
 	function next() {
 		const place = nextUncertain(runs, frame);
 		if (place === null) explain(runs.length ? 'No frame is uncertain.' : 'No ball is followed in this shot.');
+		else if (place === frame) explain('No other frame is uncertain.');
 		else goTo(place);
 	}
 	const middle = { x: (one.width ?? 0) / 2, y: (one.height ?? 0) / 2 };
 	return {
 		all, runs, run, cross, busy, error: error ?? list.error ?? read.error, click, confirm, next, remove,
+		question: run && worth && doomed === tag(run) ? worth : '',
+		keep: () => setDoomed(''),
+		reload: list.reload,
 		accept: () => decide(true),
 		takeBack: () => decide(false),
 		turnCross: () => { stand(); setCross(cross ? null : middle); },

@@ -115,16 +115,17 @@ function Film({ one, running, reload }) {
 		return end;
 	}, [one.id, one.sha256, one.frames]);
 	useEnded(running.jobs, read);
-	useEnded(running.jobs.filter(({ kind }) => kind === 'instants'), reload);
 	const doing = useRef({ change, undo, turn: chosen.turn });
 	doing.current = { change, undo, turn: chosen.turn };
 	const keys = useMemo(() => keysOfRecording(one, () => shots.list.value?.items ?? [], doing), [one.id]);
 	useKeys(keys);
 	const shot = list?.items[shotAt(list.items, wanted.value)];
-	const cameras = useCameras(one, shot, running);
+	const cameras = useCameras(one, list?.items ?? [], shot, running);
 	useCameraKeys(cameras);
 	const balls = useBalls(one, shot);
 	useBallKeys(balls);
+	// Groups get the balls that are accepted.
+	useEnded(running.jobs.filter(({ kind }) => kind === 'instants'), () => { reload(); balls.reload(); });
 	if (error) {
 		return html`
 			<${Trouble} title="The shots cannot be shown" error=${error} retry=${read} />

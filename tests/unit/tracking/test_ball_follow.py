@@ -127,6 +127,17 @@ class TestFollowBall:
         assert hidden and {ball.state for ball in hidden} == {"uncertain"}
         assert max(film.off(run)[-10:]) < 1.0
 
+    @pytest.mark.parametrize("last", [20, 30])
+    def test_it_is_lost_where_the_last_frames_do_not_show_it(self, last: int) -> None:
+        def wall(picture: Image, number: int) -> None:
+            if number > 12:
+                picture[:] = (120, 30, 40)
+
+        film = Film(straight(), before=wall)
+        run = follow_ball(film.read, BallClick(8, *film.way[8]), range(7, 0, -1), range(9, last))
+        assert run is not None
+        assert (run.before, run.after) == ("limit", "lost") and run.last < 16
+
     def test_it_goes_through_other_clicks_and_ends_at_them(self) -> None:
         steps = np.arange(FRAMES)
         way = np.column_stack([120 + 0.4 * steps, np.full(FRAMES, 120.0)])

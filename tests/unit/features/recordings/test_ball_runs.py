@@ -170,6 +170,26 @@ class TestAccept:
         with store.read() as session:
             assert replay_log(session).groups == read_state_snapshot(session).groups
 
+    def test_groups_that_are_made_after_it_get_the_ball_and_give_it_back(
+        self, api: Any, recording: str, finished: Finished, store: Store
+    ) -> None:
+        take(api, recording, finished, 3)
+        accepted = change(api, follow(api, recording).json(), accepted=True).json()
+        take(api, recording, finished, 3, 13, 20)
+        found = balls(api)
+        assert found[13] == []
+        ((mine,), (ball,)) = found[3], found[20]
+        assert ball["predicted_by"] == mine["predicted_by"] and ball["source"] == mine["source"]
+        number = accepted["id"]
+        now = api.get(f"{recording}/ball-runs/{number}").json()
+        assert (now["placed"], now["kept"]) == (2, 0) and now["etag"] != accepted["etag"]
+        assert change(api, now, accepted=False).json()["accepted_by"] is None
+        assert balls(api) == {3: [], 13: [], 20: []}
+        take(api, recording, finished, 22)
+        assert balls(api)[22] == []
+        with store.read() as session:
+            assert replay_log(session).groups == read_state_snapshot(session).groups
+
     def test_uncertain_frames_take_part_once_they_are_confirmed(
         self, api: Any, recording: str, finished: Finished
     ) -> None:
