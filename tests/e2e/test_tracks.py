@@ -76,6 +76,16 @@ def track(flight: str, open_page: OpenPage) -> Page:
 
 
 class TestTracks:
+    def test_a_list_follows_a_job_that_was_begun_elsewhere(
+        self, server: str, flight: str, open_page: OpenPage
+    ) -> None:
+        page = open_page(f"/datasets/{flight}/tracks")
+        expect(page.get_by_role("button", name="Track the ball")).to_be_enabled()
+        with httpx.Client(base_url=f"{server}/api/v1") as client:
+            ended(client, client.post(f"/datasets/{flight}/tracks", json={}))
+        expect(page.get_by_role("link", name="issia", exact=True)).to_be_visible()
+        expect(page.get_by_role("button", name="Recompute the tracks")).to_be_visible()
+
     def test_are_looked_at_corrected_and_judged_by_key(self, track: Page) -> None:
         page = track
         expect(page.get_by_text("no verdict yet")).to_be_visible()

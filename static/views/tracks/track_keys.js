@@ -34,6 +34,7 @@ export function keysOfTrack(doing) {
 	const toEvent = (way) => {
 		const next = eventBy(doing.current.frames?.events ?? [], doing.current.at, way);
 		if (next) goTo(next.frame);
+		else explain(`No event comes ${way > 0 ? 'after' : 'before'} this frame.`);
 	};
 	const second = () => Math.round(doing.current.track.summary.rate);
 	return [
@@ -50,11 +51,13 @@ export function keysOfTrack(doing) {
 		{ keys: ['Shift+ArrowLeft'], label: 'One second back', group: look, repeats: true, run: () => stepBy(-second()) },
 		{ keys: ['n'], label: 'Next event', group: look, repeats: true, run: () => toEvent(1) },
 		{ keys: ['p'], label: 'Previous event', group: look, repeats: true, run: () => toEvent(-1) },
-		{ keys: ['w'], label: 'Worst frame: the largest left-out error', group: look, run: () => { const { worst } = doing.current.track.summary; if (worst !== null) goTo(worst); } },
+		{ keys: ['w'], label: 'Worst frame: the largest left-out error', group: look, run: () => { const { worst } = doing.current.track.summary; if (worst !== null) goTo(worst); else explain('No ball was left out to measure the error.'); } },
 		{ keys: ['c'], label: 'Next frame with a ball that contradicts the track', group: look, run: () => {
 			const { frames, at } = doing.current;
 			const frame = contradictedAfter(frames?.contradicted ?? [], at);
-			if (frame !== undefined) goTo(frame);
+			if (frame === undefined) explain('No ball contradicts the track.');
+			else if (frame === at) explain('No other frame has a ball that contradicts the track.');
+			else goTo(frame);
 		} },
 		{ keys: ['+', '='], label: 'Show fewer frames', group: look, shown: '+', repeats: true, run: () => doing.current.zoom(0.5) },
 		{ keys: ['-'], label: 'Show more frames', group: look, repeats: true, run: () => doing.current.zoom(2) },

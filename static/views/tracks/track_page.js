@@ -22,6 +22,7 @@ import { amid, contradictedAfter, corrected, curvesOf, eventAt, EVENTS, forgetTr
 import { Chart, Numbers } from '../chart.js';
 import { pageAddress } from '../dataset_menu.js';
 import { Loading, PageFrame, Trouble } from '../page_frame.js';
+import { ClickAgain } from './click_again.js';
 import { EventCard } from './event_card.js';
 import { keysOfTrack } from './track_keys.js';
 import { TrackSpace } from './track_scene.js';
@@ -163,7 +164,7 @@ function FrameCard({ track, frames, around, at, goTo }) {
 				${jump ? html`<dt>Jump</dt><dd>${jumpText(jump)}</dd>` : null}
 				<dt>Left-out error</dt><dd>${frames.left_out_px[place] === null ? '–' : `${fixed(frames.left_out_px[place], 1)} px`}</dd>
 			</dl>
-			${against.map((one) => html`<div class="track__against" key=${one.view}><p><strong>${one.view}</strong> is ${fixed(one.px, 0)} px off. ${one.sentence}</p><p class="note">${one.fix}</p></div>`)}
+			${against.map((one) => html`<div class="track__against" key=${one.view}><p><strong>${one.view}</strong> is ${fixed(one.px, 0)} px off. ${one.sentence}</p><p class="note">${one.fix}</p>${one.group === null ? html`<${ClickAgain} track=${track} view=${one.view} frame=${at} />` : null}</div>`)}
 			${around ? html`<${Now} around=${around} at=${at} />` : null}
 			<p class="buttons">
 				${group === null ? html`<button class="button" type="button" aria-disabled="true" title="No group shows this frame">Open the group</button>` : html`<a class="button" href=${`/review/${group}`}>Open the group <kbd>Enter</kbd></a>`}
@@ -173,9 +174,10 @@ function FrameCard({ track, frames, around, at, goTo }) {
 	`;
 }
 
-/** @param {{track: TrackJson, judge: (verdict: 'accepted' | 'rejected' | 'none') => void, toContradicted: () => void}} props */
-function VerdictCard({ track, judge, toContradicted }) {
+/** @param {{track: TrackJson, frames: TrackFrames, judge: (verdict: 'accepted' | 'rejected' | 'none') => void, toContradicted: () => void}} props */
+function VerdictCard({ track, frames, judge, toContradicted }) {
 	const { summary } = track;
+	const alone = frames.contradicted.filter(({ group }) => group === null).length;
 	const why = track.stale ? 'Its groups have changed: recompute the track first' : '';
 	/** @param {'accepted' | 'rejected'} verdict */
 	const press = (verdict) => judge(track.verdict === verdict ? 'none' : verdict);
@@ -183,7 +185,7 @@ function VerdictCard({ track, judge, toContradicted }) {
 		<section class="card" aria-labelledby="track-title">
 			<h2 id="track-title">Track</h2>
 			<p>${verdictText(track)}${track.judged_by && track.verdict ? html` by ${track.judged_by}` : null}</p>
-			<p class="note">${summary.median_px === null ? 'No ball could be left out to measure the error' : `Error of left-out balls: median ${fixed(summary.median_px, 1)} px, 95 % within ${fixed(summary.p95_px, 1)} px`}. Made from ${plural(summary.measurements, 'ball')} of all views${summary.contradicted ? html`; <button class="link-button" type="button" title="The next frame with a ball that contradicts the track (c)" onClick=${toContradicted}>${summary.contradicted} ${summary.contradicted === 1 ? 'contradicts' : 'contradict'} the track</button>` : null}.</p>
+			<p class="note">${summary.median_px === null ? 'No ball could be left out to measure the error' : `Error of left-out balls: median ${fixed(summary.median_px, 1)} px, 95 % within ${fixed(summary.p95_px, 1)} px`}. Made from ${plural(summary.measurements, 'ball')} of all views${summary.contradicted ? html`; <button class="link-button" type="button" title="The next frame with a ball that contradicts the track (c)" onClick=${toContradicted}>${summary.contradicted} ${summary.contradicted === 1 ? 'contradicts' : 'contradict'} the track</button>${alone ? `, ${alone} in frames without a group` : ''}` : null}.</p>
 			${(summary.median_px ?? 0) > CLICK_PX ? html`<p class="note">Left-out balls are predicted less exactly than a click: the cameras contradict each other. An adjustment to lines and balls (<code>touchline rig</code>) may bring them together.</p>` : null}
 			<p class="buttons">
 				<button class="button" type="button" data-needs="review" data-of=${track.dataset} aria-pressed=${track.verdict === 'accepted'} aria-disabled=${why !== ''} title=${why} onClick=${() => { if (!why) press('accepted'); }}>Accept <kbd>A</kbd></button>
@@ -370,7 +372,7 @@ function Track({ track, setTrack }) {
 			</section>
 			<div class="track__rail">
 				<${FrameCard} track=${track} frames=${frames} around=${around} at=${at} goTo=${goTo} />
-				<${VerdictCard} track=${track} judge=${judge} toContradicted=${() => { const frame = contradictedAfter(frames.contradicted, at); if (frame !== undefined) goTo(frame); }} />
+				<${VerdictCard} track=${track} frames=${frames} judge=${judge} toContradicted=${() => { const frame = contradictedAfter(frames.contradicted, at); if (frame !== undefined) goTo(frame); }} />
 				<${EventCard} frames=${frames} removed=${track.corrections.filter(({ added }) => !added)} at=${at} goTo=${goTo} correct=${correct} restore=${restore} />
 			</div>
 		</div>

@@ -11,7 +11,7 @@ import { count, fixed, plural, sharePercent } from '../../lib/format.js';
 import { useResource } from '../../lib/resource.js';
 import { withValue } from '../../lib/field.js';
 import { address, navigate, place } from '../../lib/router.js';
-import { follow, isOver } from '../../state/jobs.js';
+import { isOver, jobToShow } from '../../state/jobs.js';
 import { me } from '../../state/me.js';
 import { choiceOf, listValues, SHOWN, SORTS, trackAddress } from '../../state/track_list.js';
 import { datasetPage } from '../dataset_frame.js';
@@ -19,8 +19,8 @@ import { FormError } from '../form_error.js';
 import { JobButton } from '../job_button.js';
 import { JobProgress } from '../job_progress.js';
 import { Loading, Trouble } from '../page_frame.js';
+import { useEnded, useRunningJobs } from '../running_jobs.js';
 
-/** @import {JobJson} from '../../api/jobs.js' */
 /** @import {ListedTrackJson, TrackJson} from '../../api/tracks.js' */
 /** @import {DatasetJson} from '../../api/types.js' */
 
@@ -75,20 +75,18 @@ function Tracks({ one }) {
 	const who = me.value?.name ?? 'local';
 	const found = useResource((signal) => getTracks(one.name, choiceOf(values, who), signal), [one.id, JSON.stringify(values), who]);
 	const [giving, setGiving] = useState(false);
-	const [job, setJob] = useState(/** @type {JobJson | null} */ (null));
-	const { error, attempt } = useAttempt();
+	const { jobs, watch } = useRunningJobs({ dataset: one.name, kind: 'ball' }, ({ kind, dataset }) => kind === 'ball' && dataset === one.name);
+	const job = jobToShow(jobs);
+	useEnded(jobs, found.reload);
+	const { error, busy, attempt } = useAttempt();
 	const items = found.value?.items ?? [];
 	const chosen = Object.values(values).some(Boolean);
 	const open = items.filter((track) => track.verdict === null && !track.summary.reason);
-	const make = () => attempt(postTracks(one.name), async (begun) => {
-		await follow(begun, setJob);
-		found.reload();
-	});
 	return html`
 		<section class="card" aria-labelledby="tracks-title">
 			<h2 id="tracks-title">The ball over time</h2>
 			<p class="note">A stretch is a series of groups that follow each other in time: frames of static cameras, or of one shot of a recording. The ball is tracked over each stretch. Its left-out error tells how good a track is: balls are left out in turn and predicted from the others.</p>
-			<p class="buttons"><${JobButton} kind="button--primary" busy=${job !== null && !isOver(job)} act=${make}>${items.length || chosen ? 'Recompute the tracks' : 'Track the ball'}<//>${open.length ? html`<button class="button" type="button" data-needs="lead" aria-disabled=${found.waiting} title=${found.waiting ? 'The list is being read' : ''} onClick=${() => { if (!found.waiting) setGiving(true); }}>Assign…</button>` : null}</p>
+			<p class="buttons"><${JobButton} kind="button--primary" busy=${busy || (job !== null && !isOver(job))} act=${() => attempt(postTracks(one.name), watch)}>${items.length || chosen ? 'Recompute the tracks' : 'Track the ball'}<//>${open.length ? html`<button class="button" type="button" data-needs="lead" aria-disabled=${found.waiting} title=${found.waiting ? 'The list is being read' : ''} onClick=${() => { if (!found.waiting) setGiving(true); }}>Assign…</button>` : null}</p>
 			${error ? html`<${FormError} error=${error} />` : null}
 			${job ? html`<${JobProgress} job=${job} />` : null}
 		</section>
