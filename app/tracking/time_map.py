@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -83,6 +84,7 @@ def fit_map_to_instants(
     frame_s: float,
     assumed_speed: float | None = None,
     last_s: float | None = None,
+    name_time: Callable[[float], str] = "{:.2f} s".format,
 ) -> TimeMap:
     """The map of instants that a person sees in both shots, each to about a live frame.
 
@@ -95,6 +97,7 @@ def fit_map_to_instants(
         assumed_speed: Speed of the replay while one instant is known; None: that of the live shot.
         last_s: Replay time of its last frame, seconds after its first one; the live times of both have to be known.
             None: nobody asks for them.
+        name_time: How reasons name a time of the replay.
     """
     if not len(instants):
         return TimeMap("No instant is linked yet.", by_hand=True)
@@ -113,7 +116,7 @@ def fit_map_to_instants(
         speed, sigma = piece.speed or 0.0, _speed_sigma(piece)
         if sigma > _UNSURE:
             reason = (
-                f"The instants near {piece.first:.2f} s are too close together to tell the speed "
+                f"The instants near {name_time(piece.first)} are too close together to tell the speed "
                 f"({speed:.2g} ± {sigma:.2g}); link one farther away"
             )
             if len(pieces) == 1:
@@ -123,7 +126,8 @@ def fit_map_to_instants(
             reason = f"{reason}."
         elif not _SLOWEST <= speed <= _FASTEST:
             reason = (
-                f"The instants make the replay run at {speed:.2g} times the live speed: check them."
+                f"The instants make the replay run at {speed:.2g} times the live speed, which is unlikely: check"
+                " them."
             )
         else:
             continue
@@ -136,7 +140,7 @@ def fit_map_to_instants(
         return replace(_make_map_with_assumed_speed(rows, speed, unsure), too_close=True)
     if unsure is not None:
         return TimeMap(f"{unsure}.", by_hand=True)
-    changes = " and ".join(f"{piece.first:.2f} s" for piece in pieces[1:])
+    changes = " and ".join(name_time(piece.first) for piece in pieces[1:])
     reason = f"One offset and speed do not fit the whole replay: they change near {changes}."
     return TimeMap(reason, by_hand=True, pieces=tuple(pieces))
 

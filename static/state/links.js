@@ -1,7 +1,7 @@
 // @ts-check
 /** Links of replays as values: what is said of their times, and which frames show the same. Speeds: 0.25 is four times slow. */
 
-/** @import {InstantPair, LinkedFrames, LinkMap} from '../api/recordings.js' */
+/** @import {InstantPair, LinkedFrames, LinkJson, LinkMap} from '../api/recordings.js' */
 
 /** How fast a replay runs, in words. @param {number} speed */
 export function speedText(speed) {
@@ -12,9 +12,13 @@ export function speedText(speed) {
 /** A standard deviation with two digits that count. @param {number} sigma */
 const sigmaText = (sigma) => sigma.toFixed(sigma > 0 ? Math.min(Math.max(1 - Math.floor(Math.log10(sigma)), 1), 6) : 1);
 
+/** Faster than live, times, beyond which hardly any replay runs. */
+const FASTEST = 1.4;
+
 /** What is known of the times of a replay, in sentences. @param {LinkMap} map @param {number} fps of the live shot @returns {string[]} */
 export function mapText(map, fps) {
 	const told = timesText(map, fps);
+	if ([map, ...map.pieces].some(({ speed }) => (speed ?? 1) > FASTEST)) told.push('A replay that runs faster than live is unlikely: check the instants and the speed.');
 	return map.ball_reason ? [...told, `The times could not be found from the ball. ${map.ball_reason}`] : told;
 }
 
@@ -32,6 +36,12 @@ function timesText({ outcome, found_by, reason, speed, speed_sigma, sigma_s, mis
 	const known = sigma_s === null ? '' : ` Its times are known to ± ${sigmaText(sigma_s * fps)} live frames (one sigma, in the middle of the replay).`;
 	const missed = miss_m === null ? '' : ` The rays to the ball miss each other by ${miss_m.toFixed(2)} m.`;
 	return [`The replay runs ${speedText(speed ?? 1)} (speed ${(speed ?? 1).toFixed(3)}${speed_sigma === null ? '' : ` ± ${sigmaText(speed_sigma)}`}). ${source}.${known}${missed}`];
+}
+
+/** Why a replay cannot follow the live shot; '': it can. @param {LinkJson} link */
+export function whyApart({ map, instants }) {
+	if (map.outcome === 'linked') return '';
+	return map.reason && instants.length > 1 ? map.reason : 'Link two instants first.';
 }
 
 /** The frame of the replay that shows what a live frame shows; null outside of the replay. @param {LinkedFrames} frames @param {number} live */

@@ -351,7 +351,7 @@ class TestCutting:
         theirs = {"shots": [{"first": 0, "last": 119, "kind": "closeup"}]}
         assert page.request.put(path, data=theirs, headers={"If-Match": tag}).ok
         page.keyboard.press("1")
-        expect(page.get_by_text("Another person changed the shots")).to_be_visible()
+        expect(page.get_by_text("The shots changed in another window")).to_be_visible()
         expect(page.get_by_role("region", name="Shots").get_by_role("button")).to_have_count(1)
         assert shots_of(page, recording)[0]["kind"] == "closeup"
 
@@ -486,10 +486,12 @@ class TestLinking:
         self, recording: int, link: str, open_page: OpenPage
     ) -> None:
         page = opened(open_page, recording)
-        page.keyboard.press("ArrowDown")
+        with page.expect_response("**/links/suggestions/**"):
+            page.keyboard.press("ArrowDown")
         shows(page, 40)
         card = page.get_by_role("region", name="Links")
         expect(card).to_contain_text("0 instants")
+        expect(card).not_to_contain_text("No shot of the main camera")
         card.get_by_role("link", name="frames 0 to 39").click()
         side(page, "Live", 0)
         page.get_by_role("button", name="Remove this link").click()
@@ -574,9 +576,16 @@ class TestLinking:
         side(page, "Replay", 44)
         page.get_by_role("slider", name="Replay frame").press("ArrowRight")
         side(page, "Replay", 45)
-        expect(page.get_by_role("button", name="Play together")).to_have_attribute(
-            "aria-pressed", "false"
-        )
+        together = page.get_by_role("button", name="Play together")
+        expect(together).to_have_attribute("aria-pressed", "false")
+        page.wait_for_url("**live=12&replay=45")
+        page.reload()
+        side(page, "Live", 12)
+        side(page, "Replay", 45)
+        page.keyboard.press("ArrowDown")
+        side(page, "Live", 29)
+        page.keyboard.press("p")
+        until(page, lambda: 10 <= frame_of(page, "Live") < 20)
 
     def test_groups_get_the_views_of_linked_replays(
         self, recording: int, link: str, open_page: OpenPage
@@ -616,7 +625,7 @@ class TestLinking:
         theirs = {"instants": [{"live": 10, "replay": 40}]}
         assert page.request.put(f"/api/v1{link}/instants", data=theirs, headers=tag).ok
         page.keyboard.press("i")
-        expect(page.get_by_text("Another person changed this link")).to_be_visible()
+        expect(page.get_by_text("This link changed in another window")).to_be_visible()
         expect(page.get_by_role("region", name="Instants")).to_contain_text("1 instant")
         assert linked(page, link) == [(10, 40)]
 

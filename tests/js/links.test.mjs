@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { instantBeside, mapText, markOf, replayFrameAt, speedText, withInstant } from '../../static/state/links.js';
+import { instantBeside, mapText, markOf, replayFrameAt, speedText, whyApart, withInstant } from '../../static/state/links.js';
 
 const INSTANTS = [{ live: 5, replay: 30 }, { live: 15, replay: 50 }];
 const FRAMES = { first: 4, replay: [null, 20, 22], off_s: [null, 0, 0], repeated: [21], blended: [22] };
@@ -40,4 +40,15 @@ test('the instant before and behind a frame is the nearest one', () => {
 	assert.equal(instantBeside(INSTANTS, 'live', 5, 1), INSTANTS[1]);
 	assert.equal(instantBeside(INSTANTS, 'replay', 60, -1), INSTANTS[1]);
 	assert.equal(instantBeside(INSTANTS, 'live', 5, -1), undefined);
+});
+
+test('a replay that cannot follow says why', () => {
+	assert.equal(whyApart({ map: MAP, instants: INSTANTS }), '');
+	assert.equal(whyApart({ map: { ...MAP, outcome: 'offset', reason: 'One; 1 is assumed.' }, instants: INSTANTS.slice(1) }), 'Link two instants first.');
+	assert.equal(whyApart({ map: { ...MAP, outcome: 'unobservable', reason: 'They run backwards.' }, instants: INSTANTS }), 'They run backwards.');
+});
+
+test('a replay that runs much faster than live is unlikely', () => {
+	assert.match(mapText({ ...MAP, speed: 5 }, 50).at(-1) ?? '', /is unlikely/);
+	assert.doesNotMatch(mapText({ ...MAP, speed: 1.02 }, 50).join(), /unlikely/);
 });

@@ -305,8 +305,12 @@ def _compute_link_time_map(
     _, replay = parse_linked_shots(row)
     live_times, times = read_link_times(settings, row)
     given = compute_instant_times(row, pairs, live_times, times)
+
+    def name_frame(seconds: float) -> str:
+        return f"frame {replay.first + int(np.abs(times - seconds).argmin())}"
+
     found = fit_map_to_instants(
-        given, compute_frame_interval(live_times), assumed_speed, float(times[-1])
+        given, compute_frame_interval(live_times), assumed_speed, float(times[-1]), name_frame
     )
     made = make_link_time_map(found, replay, times, "instants" if pairs else None)
     return made, compute_link_residuals(made, given, live_times)

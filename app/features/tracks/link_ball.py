@@ -71,7 +71,7 @@ class LinkByBallResult:
         outcome: That of its map.
         reason: Why the ball does not tell the times; None: it does.
         rays: Frames of the live shot and of the replay whose ball has a camera.
-        left_out: Of both, frames whose ball has none, and rows that are of no use.
+        left_out: Frames of both shots whose ball has none, and rows that cannot be read.
     """
 
     link: int
@@ -218,7 +218,7 @@ def _collect_ball_rays(
     report: ReaderReport,
     link_id: int,
 ) -> tuple[BallRays, int]:
-    """The rays of the ball in a shot, and how many frames with a ball have no camera, or are of another shot."""
+    """The rays of the ball in a shot, and how many of its frames with a ball have no camera."""
     if upload is None:
         seen = dict(_iterate_balls_of_groups(store, shot, shots))
     else:
@@ -259,9 +259,8 @@ def _collect_ball_rays(
             f"{frames} have {plural(len(inside), 'ball')} {where}, but no camera in any of those frames",
             hint="Track the camera of the shot, or mark the ball in frames that have a camera.",
         )
-    left_out = len(seen) - sum(number in seen for number in inside)
     rays_found = build_ball_rays(*(list(column) for column in zip(*rays, strict=True)))
-    return rays_found, left_out + len(inside) - len(rays)
+    return rays_found, len(inside) - len(rays)
 
 
 def read_tracked_ball_positions(

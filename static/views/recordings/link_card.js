@@ -44,7 +44,7 @@ function Suggestions({ one, shots, shot }) {
 		<h3>Link to the live shot</h3>
 		${found.error ? html`<${FormError} error=${found.error} />` : null}
 		${error ? html`<${FormError} error=${error} />` : null}
-		${found.value && !items.length ? html`<p class="empty-note">No shot of the main camera comes before this replay. Choose the live shot from the list.</p>` : null}
+		${found.value && !found.value.items.length ? html`<p class="empty-note">No shot of the main camera comes before this replay. Choose the live shot from the list.</p>` : null}
 		<ul class="linking__choices">
 			${items.map((item) => html`
 				<li key=${`${item.recording}-${item.first}`}>

@@ -11,9 +11,9 @@ import { useAttempt } from '../../lib/attempt.js';
 import { plural } from '../../lib/format.js';
 import { useKeys, useSize } from '../../lib/hooks.js';
 import { useResource } from '../../lib/resource.js';
-import { navigate, page } from '../../lib/router.js';
+import { address, navigate, page, param, place } from '../../lib/router.js';
 import { useDataset } from '../../state/datasets.js';
-import { instantBeside, markOf, replayFrameAt, withInstant } from '../../state/links.js';
+import { instantBeside, markOf, replayFrameAt, whyApart, withInstant } from '../../state/links.js';
 import { announce, complain, explain } from '../../state/notice.js';
 import { makePlayer } from '../../state/playback.js';
 import { clockOf, matchTime, timecode } from '../../state/shots.js';
@@ -30,6 +30,10 @@ import { keysOfLink } from './link_keys.js';
 /** @typedef {'live' | 'replay'} Side */
 /** @typedef {{instants: InstantPair[], assumed_speed: number | null}} Said */
 
+/** So few frames before the end nothing is left to play. */
+const END = 5;
+/** How long frames are at hand before the address says so, milliseconds. */
+const SETTLED = 300;
 const NAMES = { live: 'Live', replay: 'Replay' };
 
 /** The link, and what changes it: each change upon the last answer; the last one is taken back. @param {LinkJson} first */
@@ -62,15 +66,15 @@ function useLink(first) {
 		});
 	}
 	const reload = async () => keep(await getLink(recording, id));
-	/** Another person was first. */
+	/** It was changed elsewhere first. */
 	async function meet() {
 		before.current = [];
 		try {
 			await reload();
-			complain('Another person changed this link; the page shows the new state.');
+			complain('This link changed in another window or by another person; the page shows the new state.');
 		} catch (problem) {
 			if (!(problem instanceof ApiError)) throw problem;
-			complain(`Another person changed this link. Load the page again to see the new state: ${problem.message}`);
+			complain(`This link changed in another window or by another person. Load the page again to see the new state: ${problem.message}`);
 		}
 	}
 	return { link, change, reload, undo: () => change(() => { const last = before.current.pop(); if (!last) explain('There is nothing to undo.'); return last ?? null; }, 'Undone.', false) };
@@ -106,6 +110,22 @@ function Stage({ side, shot, player, one, focused, focus, mark }) {
 	`;
 }
 
+/** Write both frames into the address while nothing plays, so that a reload and Back find them. @param {number} link @param {{live: Player, replay: Player}} players */
+function useFramesInAddress(link, players) {
+	const [live, replay] = [players.live.wanted.value, players.replay.wanted.value];
+	const plays = players.live.speed.value !== 0 || players.replay.speed.value !== 0;
+	useLayoutEffect(() => {
+		if (plays) return undefined;
+		const timer = setTimeout(() => {
+			const shown = page.peek();
+			// The next page may be asked for and not yet drawn.
+			if (shown.page !== 'link' || shown.link !== link || (param('live') === String(live) && param('replay') === String(replay))) return;
+			navigate(address(place.peek().path, { live: String(live), replay: String(replay) }), { replace: true });
+		}, SETTLED);
+		return () => clearTimeout(timer);
+	}, [live, replay, plays]);
+}
+
 /** @param {{first: LinkJson, recordings: {live: RecordingJson, replay: RecordingJson}}} props */
 function Both({ first, recordings }) {
 	const { link, change, reload, undo } = useLink(first);
@@ -123,8 +143,10 @@ function Both({ first, recordings }) {
 			return players[which].openFilm({ id, sha256, frames: count ?? 0, fps: fps ?? 25, first: first[which].first, last: first[which].last });
 		};
 		const ends = [open('live'), open('replay')];
+		for (const which of /** @type {Side[]} */ (['live', 'replay'])) if (param(which)) players[which].goTo(Number(param(which)) || 0);
 		return () => { for (const end of ends) end(); };
 	}, [first.id]);
+	useFramesInAddress(first.id, players);
 	useEffect(() => { if (!usable) setTogether(false); }, [usable]);
 	const follows = useRef(false);
 	follows.current = together && usable;
@@ -155,7 +177,7 @@ function Both({ first, recordings }) {
 		players.replay.goTo(replay);
 	}
 	function playTogether() {
-		if (!usable) { explain('Link two instants first.'); return; }
+		if (!usable) { explain(whyApart(link)); return; }
 		const next = !together;
 		setTogether(next);
 		setSide('live');
@@ -166,9 +188,11 @@ function Both({ first, recordings }) {
 			return;
 		}
 		const start = mapped.current?.replay.findIndex((frame) => frame !== null) ?? -1;
-		const here = mapped.current && replayFrameAt(mapped.current, players.live.wanted.value);
-		// From where both show something.
-		if (mapped.current && here === null && start >= 0) players.live.goTo(mapped.current.first + start);
+		const last = mapped.current?.replay.findLastIndex((frame) => frame !== null) ?? -1;
+		const at = players.live.wanted.value;
+		const here = mapped.current && replayFrameAt(mapped.current, at);
+		// From where both show something, and go on.
+		if (mapped.current && start >= 0 && (here === null || at + END > mapped.current.first + last)) players.live.goTo(mapped.current.first + start);
 		else if (here !== null) players.replay.goTo(here);
 		if (!players.live.speed.value) players.live.run(1);
 	}
@@ -194,7 +218,7 @@ function Both({ first, recordings }) {
 			<${TimesCard} link=${link} frames=${frames.value} fps=${recordings.live.fps ?? 25} dataset=${dataset} assume=${(/** @type {number} */ speed) => change(({ instants }) => ({ instants, assumed_speed: speed }), 'The speed is assumed.')}>
 				<p class="buttons">
 					<button class="button button--primary" type="button" data-needs="annotate" data-of=${dataset} aria-disabled=${Boolean(here)} title=${here ? 'These two frames are linked already' : 'Link these two frames: both show the same instant'} onClick=${() => { if (!here) linkHere(); }}>Same instant <kbd>I</kbd></button>
-					<button class="button" type="button" aria-pressed=${together} aria-disabled=${!usable} title=${usable ? '' : 'Link two instants first'} onClick=${playTogether}>Play together <kbd>P</kbd></button>
+					<button class="button" type="button" aria-pressed=${together} aria-disabled=${!usable} title=${whyApart(link).replace(/\.$/, '')} onClick=${playTogether}>Play together <kbd>P</kbd></button>
 				</p>
 			<//>
 			<${InstantsList} link=${link} dataset=${dataset} show=${show} remove=${remove}>

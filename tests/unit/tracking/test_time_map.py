@@ -71,7 +71,8 @@ class TestMapOfInstants:
         made = made_of([(2.0, 0.0), (14.0, 4.0)])
         assert made.speed is None
         assert (
-            made.reason == "The instants make the replay run at 3 times the live speed: check them."
+            made.reason
+            == "The instants make the replay run at 3 times the live speed, which is unlikely: check them."
         )
 
     def test_more_are_fitted_and_inaccuracy_of_a_frame_is_no_change_of_speed(self) -> None:

@@ -146,7 +146,7 @@ class TestSetInstants:
         close = instants(api, link, (5, 30), (6, 32)).json()["map"]
         assert [one["too_close"], close["too_close"]] == [False, True]
         assert one["outcome"] == close["outcome"] == "offset"
-        assert "too close together" in close["reason"]
+        assert "The instants near frame 30 are too close together" in close["reason"]
 
     def test_two_that_leave_the_end_of_the_replay_unknown_are_not_linked(
         self, api: Any, link: str
