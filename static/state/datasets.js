@@ -64,7 +64,8 @@ export async function loadDatasets() {
 	}
 }
 
-/** @param {string} name */
+/** Mean a dataset, which may have been made since the list was read. @param {string} name */
 export function useDataset(name) {
 	remembered.value = name;
+	if (datasets.value && !datasets.value.some((one) => one.name === name)) loadDatasets();
 }

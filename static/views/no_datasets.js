@@ -23,9 +23,9 @@ export function NoDatasets() {
 	return html`
 		<section class="card empty">
 			<h2>No dataset yet</h2>
-			<p>Import your own files here, or start the server with the sample dataset:</p>
+			<p>Import your own files, or add a video of a match on the page Recordings. To try it out, open the practice, or start the server with the sample dataset:</p>
 			<pre>touchline serve --sample</pre>
-			<p><a class="button button--primary" href="/import">Import a dataset</a></p>
+			<p class="buttons"><a class="button button--primary" href="/import">Import a dataset</a> <a class="button" href="/recordings">Add a video of a match</a> <a class="button" href="/help/practice">Practice</a></p>
 		</section>
 	`;
 }

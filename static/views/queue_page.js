@@ -42,9 +42,10 @@ function QueueHeader({ field }) {
 	const { total, loaded } = queue.value;
 	const error = failure.value ?? queue.value.error;
 	// Which dataset is meant is known before its rows are: one that is not there has none to wait for.
-	const gone = datasets.value !== null && !one;
+	const none = datasets.value?.length === 0 && !param('dataset');
+	const gone = datasets.value !== null && !one && !none;
 	const state = error ? (error.status === 400 ? 'Invalid query' : 'No answer')
-		: gone ? 'No such dataset' : loaded && one ? `${count(total)} of ${count(one.groups)} match` : 'Loading…';
+		: none ? 'No dataset yet' : gone ? 'No such dataset' : loaded && one ? `${count(total)} of ${count(one.groups)} match` : 'Loading…';
 	return html`
 		<${Header} current="queue">
 			<div class="header__middle">
