@@ -40,6 +40,9 @@ function axis(label, colours, size, compact, space = LINE) {
 function drawOver(plot, { marker, curves }, colours) {
 	const { ctx, bbox } = plot;
 	ctx.save();
+	ctx.beginPath();
+	ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+	ctx.clip();
 	curves.forEach((curve) => drawIntervals(plot, curve, colours[curve.colour]));
 	if (marker !== null && marker !== undefined) {
 		const left = plot.valToPos(marker, 'x', true);
@@ -82,6 +85,14 @@ function rangeX(asked, low, high) {
 	return [from - room, to + room];
 }
 
+/** The ends of values with their intervals, of which so much is seen as the values span. @param {Curve[]} curves @param {number} low @param {number} high @returns {[number, number]} */
+export function withIntervals(curves, low, high) {
+	const most = high > low ? high - low : Math.max(1, Math.abs(high) * 0.1);
+	const ends = curves.flatMap((curve) => (curve.low && curve.high ? [...curve.low, ...curve.high] : [])).filter((value) => typeof value === 'number');
+	const [least, largest] = [Math.min(low, ...ends), Math.max(high, ...ends)];
+	return [Math.max(least, low - most), Math.min(largest, high + most)];
+}
+
 /** @param {[number | null, number | null] | undefined} asked @param {number} low @param {number} high @returns {uPlot.Range.MinMax} */
 function rangeY(asked, low, high) {
 	const room = high > low ? (high - low) * 0.06 : Math.max(1, Math.abs(high) * 0.1);
@@ -106,7 +117,7 @@ export function chartOptions(props, { width, height, colours, setAt }) {
 		cursor: { y: false, drag: { x: false, y: false }, points: { size: 6 } },
 		scales: {
 			x: { time: false, range: (_plot, low, high) => rangeX(props.current.xRange, low, high) },
-			y: { range: (_plot, low, high) => rangeY(props.current.yRange, low ?? 0, high ?? 1) },
+			y: { range: (_plot, low, high) => rangeY(props.current.yRange, ...withIntervals(props.current.curves, low ?? 0, high ?? 1)) },
 		},
 		axes: [axis(xLabel, colours, 34, compact, roomBeside), axis(yLabel, colours, 52, compact)],
 		series: [{}, ...curves.map((curve) => seriesOf(curve, colours))],
