@@ -45,8 +45,8 @@ export function makeShotList(id) {
 		await ask(() => list.value === present);
 	}
 
-	/** @param {Shot[]} items */
-	function send(items) {
+	/** @param {Shot[]} items @param {string} told once they are saved */
+	function send(items, told) {
 		if (!list.value) return;
 		list.value = { items, etag: list.value.etag };
 		const mine = turn;
@@ -56,10 +56,11 @@ export function makeShotList(id) {
 				const saved = await putShots(id, items, list.value?.etag ?? '');
 				// What was changed meanwhile is on its way.
 				const newest = list.value;
+				announce(told);
 				if (newest) list.value = { items: newest.items === items ? saved.items : newest.items, etag: saved.etag };
 			} catch (problem) {
 				if (!(problem instanceof ApiError)) throw problem;
-				complain(problem.status === 412 ? 'Another person changed the shots; the page shows the new state.' : problem.message);
+				complain(problem.status === 412 ? 'The shots changed in another window or by another person; the page shows the new state.' : problem.message);
 				await ask(() => true);
 				// Also what was changed until the answer came was changed in the old list.
 				turn += 1;
@@ -77,15 +78,13 @@ export function makeShotList(id) {
 	function change(items, told) {
 		if (!items || !list.value) return;
 		remember();
-		send(items);
-		announce(told);
+		send(items, told);
 	}
 
 	function undo() {
 		const last = before.pop();
 		if (!last) { explain('There is nothing to undo.'); return; }
-		send(last);
-		announce('Undone.');
+		send(last, 'Undone.');
 	}
 
 	return { list, error, read, change, undo, remember };

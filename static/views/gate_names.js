@@ -8,6 +8,11 @@ import { sharePercent } from '../lib/format.js';
 /** Gates that count views: their sentence says how many there are, and no margin does. */
 export const COUNTED = new Set(['calibratable', 'two_views', 'ball']);
 
+/** Whether nothing could be compared. A sigma that is not known has no number either, and fails. @param {GateJson} gate */
+export function isUnjudged({ value, passed, sentence }) {
+	return value === null && (passed || sentence.startsWith('not judged'));
+}
+
 /** What is wrong when the gate fails. */
 export const GATE_TITLES = /** @type {Record<string, string>} */ ({
 	calibratable: 'Too few views have a camera',

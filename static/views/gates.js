@@ -6,7 +6,7 @@ import { html } from 'htm/preact';
 import { ballOf } from '../geometry/preview.js';
 import { suggestions } from '../state/suggestions.js';
 import { gatesOpen, pointTo } from '../state/workspace.js';
-import { gateLabel, gateMargin } from './gate_names.js';
+import { gateLabel, gateMargin, isUnjudged } from './gate_names.js';
 import { carryOut } from './suggestion_actions.js';
 import { uncertainViews } from './view_state.js';
 
@@ -34,8 +34,7 @@ function follows(group, gate, before) {
 /** @param {GroupDocument} group @param {GateJson} gate @param {GateJson[]} before the gates above it @param {boolean} uncertain whether lines leave a camera open */
 export function stateOf(group, gate, before, uncertain) {
 	if (!gate.active) return { state: 'off', glyph: '·', word: 'not required' };
-	// A sigma that is not known has no number either, and fails.
-	if (gate.value === null && (gate.passed || gate.sentence.startsWith('not judged'))) return { state: 'off', glyph: '·', word: 'not judged' };
+	if (isUnjudged(gate)) return { state: 'off', glyph: '·', word: 'not judged' };
 	if (gate.passed && gate.name === 'calibratable' && uncertain) return { state: 'doubt', glyph: '!', word: 'passed, with a camera that is uncertain' };
 	if (gate.passed) return { state: 'passed', glyph: '✓', word: 'passed' };
 	if (follows(group, gate, before)) return { state: 'follows', glyph: '↳', word: 'fails because of the gate above' };

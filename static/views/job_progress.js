@@ -2,7 +2,7 @@
 /** How far a job is, in one line, with the way to end it. */
 
 import { html } from 'htm/preact';
-import { useEffect } from 'preact/hooks';
+import { useEffect, useRef } from 'preact/hooks';
 
 import { cancelJob } from '../api/jobs.js';
 import { useAttempt } from '../lib/attempt.js';
@@ -45,9 +45,14 @@ export function JobProgress({ job, cancellable = true }) {
 	const { error, attempt } = useAttempt();
 	const waits = job.state === 'waiting';
 	useEffect(() => (waits ? followOpenJobs() : undefined), [waits]);
-	const cancel = () => attempt(cancelJob(job.id));
+	const whole = useRef(/** @type {HTMLElement | null} */ (null));
+	function cancel() {
+		attempt(cancelJob(job.id));
+		// The button goes with the job: whoever pressed it by key stays here.
+		whole.current?.focus();
+	}
 	return html`
-		<div class="job" role="status">
+		<div class="job" role="status" tabindex="-1" ref=${whole}>
 			<div class="job__line">
 				<span class="pill" data-state=${toneOf(job)}>${toneOf(job) === 'partial' ? 'partly done' : job.state}</span>
 				<strong>${job.title}</strong>

@@ -23,7 +23,7 @@ function Brackets() {
 function Choice({ predicted: { sets, set } }) {
 	return html`
 		<div class="predictions__choice">
-			${sets.length < 2 ? html`<span class="predictions__set" title=${sets[0]}>${sets[0] ?? 'Set deleted'}</span>` : html`
+			${sets.length < 2 ? html`<span class="predictions__set" title=${sets[0]}>${sets[0]}</span>` : html`
 				<select class="field" aria-label="Set of predictions" value=${set || EVERY_SET} onChange=${withValue((chosen) => { shownSet.value = chosen; })}>
 					<option value=${EVERY_SET}>All ${sets.length} sets</option>
 					${sets.map((name) => html`<option key=${name} value=${name}>${name}</option>`)}
@@ -84,7 +84,7 @@ export function PredictionCard({ group }) {
 	return html`
 		<section class="card predictions" aria-label="Predictions">
 			<h2 title="Corner brackets: predicted, dotted below the threshold. Solid box: drawn by a person. Dashed box: fits the 3D ball."><${Brackets} /> Predictions</h2>
-			<${Choice} predicted=${found} />
+			${found.sets.length ? html`<${Choice} predicted=${found} />` : null}
 			<ul class="predictions__views">
 				${group.views.map((view) => html`<${Row} key=${view.key} view=${view} own=${found.views.get(view.key) ?? { marks: [], fewer: 0, origin: null }} sets=${found.set === '' ? found.sets.length : 1} />`)}
 			</ul>

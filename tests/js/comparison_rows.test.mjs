@@ -20,6 +20,12 @@ describe('comparedRows', () => {
 		]);
 	});
 
+	it('counts the gates that the review page ticks', () => {
+		const gates = [{ active: true, passed: true, value: 2, sentence: '' }, { active: true, passed: true, value: null, sentence: '' }, { active: true, passed: false, value: 1, sentence: '' }];
+		const found = comparedRows('a', null, { ...solution(null), gates });
+		assert.equal(found.find(({ name }) => name === 'gates')?.after, '1');
+	});
+
 	it('has no row for paint that nobody read', () => {
 		assert.deepEqual(shares(solution(null), solution(null)), []);
 		assert.equal(shares(solution({ supported: 0.4, explained: 0.9 }), solution(null))[0][2], '–');

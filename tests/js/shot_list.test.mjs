@@ -85,13 +85,15 @@ describe('a list of shots', () => {
 
 	it('shows the new state where another person was first, and drops what was changed in the old one', async () => {
 		const shots = await opened();
+		announced.value = { text: '', shown: false };
 		shots.change(CUT, 'Cut.');
 		shots.change(TWICE, 'Cut.');
 		await turn();
 		await asked[0].answer(412, [], '');
-		assert.equal(notice.value.text, 'Another person changed the shots; the page shows the new state.');
+		assert.equal(notice.value.text, 'The shots changed in another window or by another person; the page shows the new state.');
 		await asked[1].answer(200, WHOLE, 'd');
 		assert.deepEqual([shots.list.value, asked.length], [{ items: WHOLE, etag: 'd' }, 2]);
+		assert.equal(announced.value.text, '');
 		shots.undo();
 		await turn();
 		assert.equal(asked.length, 2);

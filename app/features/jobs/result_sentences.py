@@ -133,10 +133,11 @@ def _describe_instants(result: Json) -> str:
         result.get(name, 0) for name in ("changed", "linked_views", "outside")
     )
     if changed:
-        there += f"; {plural(changed, 'group')} got views of replays"
+        there += f"; {plural(changed, 'group')} {'would get' if result.get('dry_run') else 'got'} views of replays"
     if views or outside:
         there += f"; {plural(views, 'view')} of linked replays added, {outside:,} missing"
-    return f"{plural(result['new'], 'group')} made of {result['name']}{there}."
+    would = "would be " if result.get("dry_run") else ""
+    return f"{plural(result['new'], 'group')} {would}made of {result['name']}{there}."
 
 
 def _describe_ball_tracking(result: Json) -> str:

@@ -24,7 +24,7 @@ NEAR_FRAMES = 2
 """Between the ends of a shot and where they are."""
 NEAR_PX, OFF_PX = 2.0, 5.0
 """Median distance of the grass from where it is, pixels at 1280 wide: a camera that is right, and one that is not."""
-NEAR_LIVE_FRAMES, NEAR_PERCENT = 1.0, 5.0
+NEAR_LIVE_FRAMES, ALMOST_LIVE_FRAMES, NEAR_PERCENT = 1.0, 5.0, 5.0
 """Of a link: live frames in the middle of the replay, and of the speed."""
 _KINDS = {"main": "the main camera", "replay": "a replay", "closeup": "a close-up"}
 
@@ -233,7 +233,7 @@ def judge_replay_link(truth: FilmTruth, links: Sequence[ShotLink]) -> RecordingL
             percent = 100 * abs(speed / truth.speed - 1)
             told += f" Its speed is {speed:.3f}; the true speed is {truth.speed:g} ({percent:.1f} % off)."
             near = off <= NEAR_LIVE_FRAMES and percent <= NEAR_PERCENT
-            state = "right" if near else "almost"
+            state = "right" if near else "almost" if off <= ALMOST_LIVE_FRAMES else "open"
     return RecordingLesson(
         "link",
         "Which live shot does the replay show, from when, and how slowly?",

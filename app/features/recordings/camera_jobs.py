@@ -90,7 +90,11 @@ def run_camera_job(jobs: Jobs, store: Store, progress: JobProgress) -> Json:
 
     def report_step(done: int, total: int | None = None, _: str = "") -> None:
         rest = "; what was lost is followed backwards" if done == total else ""
-        progress(done, total, f"{plural(done, 'frame')} of {recording.name} followed{rest}.")
+        progress(
+            done,
+            total,
+            f"{done:,} of {plural(total or last - first + 1, 'frame')} of {recording.name} followed{rest}.",
+        )
 
     with leave_work_to_next_server(progress):
         if "turned" in asked:

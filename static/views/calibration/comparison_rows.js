@@ -3,6 +3,7 @@
 
 import { gradeBelow, gradeOfJac } from '../../geometry/residual.js';
 import { degrees, fixed, metres, pixelText, sharePercent } from '../../lib/format.js';
+import { isUnjudged } from '../gate_names.js';
 import { ballError } from '../../overlays/scene.js';
 
 /** @import {GroupDocument, SolutionJson, ViewSolutionJson} from '../../api/types.js' */
@@ -45,8 +46,8 @@ const MEASURES = [
 	{ name: 'explained', label: 'Paint with a marking', read: (_, solved) => solved?.calibration.paint?.explained, say: share, better: 1, step: 0.005, rare: true },
 	{ name: 'ball', label: 'Ball error here', read: (solution, solved) => (solved ? ballError(solved.view, solution) : null), say: pixelText, better: -1, step: 0.05 },
 	{ name: 'ratio', label: 'Ball size ratio', read: (_, solved) => solved?.ball?.size_ratio, say: to(2, '×'), better: 0, step: 0.005 },
-	{ name: 'gates', label: 'Gates passed', read: (solution) => solution?.gates.filter(({ active, passed }) => active && passed).length, say: to(0), better: 1, step: 0.5 },
-	{ name: 'views', label: 'Views used', read: (solution) => solution?.ball?.views.length ?? 0, say: to(0), better: 1, step: 0.5 },
+	{ name: 'gates', label: 'Gates passed', read: (solution) => solution?.gates.filter((gate) => gate.active && gate.passed && !isUnjudged(gate)).length, say: to(0), better: 1, step: 0.5 },
+	{ name: 'views', label: 'Views of the 3D ball', read: (solution) => solution?.ball?.views.length ?? 0, say: to(0), better: 1, step: 0.5 },
 	{ name: 'x', label: 'Ball x', read: (solution) => solution?.ball?.point[0], say: metres, better: 0, step: 0.005 },
 	{ name: 'y', label: 'Ball y', read: (solution) => solution?.ball?.point[1], say: metres, better: 0, step: 0.005 },
 	{ name: 'height', label: 'Ball height', read: (solution) => solution?.ball?.height_m, say: metres, better: 0, step: 0.005 },

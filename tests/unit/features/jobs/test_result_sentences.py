@@ -101,6 +101,11 @@ RESULTS = [
     ),
     (
         "instants",
+        {"name": "half.mp4", "new": 4, "unchanged": 0, "dry_run": True},
+        "4 groups would be made of half.mp4.",
+    ),
+    (
+        "instants",
         {"name": "half.mp4", "new": 1, "unchanged": 3},
         "1 group made of half.mp4; 3 were there before.",
     ),

@@ -88,6 +88,10 @@ def test_each_lesson_is_open_until_it_is_mended_and_says_what_is_right_in_number
         pairs.append((min(max(round(seconds * truth.fps), live.first), live.last), frame))
     set_instants(store, number, link.id, pairs[:1], None, None, actor="ann")
     assert "Its speed is assumed" in lessons(store)["link"].feedback
+    for frames, state in ((22, "open"), (3, "almost")):
+        off = [(one + frames, two) for one, two in pairs]
+        set_instants(store, number, link.id, off, None, None, actor="ann")
+        assert lessons(store)["link"].state == state
     set_instants(store, number, link.id, pairs, None, None, actor="ann")
     last = lessons(store)
     assert {name: one.state for name, one in last.items()} == dict.fromkeys(last, "right")
