@@ -142,7 +142,7 @@ export function BallCard({ one, shot, balls }) {
 				<button class="button" type="button" aria-disabled=${runs.length === 0} title=${runs.length ? '' : 'No ball is followed in this shot'} onClick=${balls.next}>Next uncertain <kbd>V</kbd></button>
 				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${why !== '' || sure !== '' || accepted} title=${why || sure || 'Confirm that these uncertain frames are right'} onClick=${balls.confirm}>Confirm <kbd>O</kbd></button>
 				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-pressed=${balls.cross !== null} title="Shows a cross that the arrow keys move; Enter follows the ball from there" onClick=${balls.turnCross} onKeyDown=${enter}>Cross <kbd>F</kbd></button>
-				<button class="button" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${why !== ''} title=${why} aria-live="polite" onBlur=${balls.keep} onClick=${(/** @type {MouseEvent} */ event) => { if (event.detail < 2) balls.remove(); }}>${balls.question || 'Delete'} <kbd>Del</kbd></button>
+				<button class="button ${balls.question ? 'button--danger' : ''}" type="button" data-needs="annotate" data-of=${one.dataset} aria-disabled=${why !== ''} title=${why} aria-live="polite" onBlur=${balls.keep} onClick=${(/** @type {MouseEvent} */ event) => { if (event.detail < 2) balls.remove(); }}>${balls.question || 'Delete'} <kbd>Del</kbd></button>
 			</div>
 			<p role="status">${busy ? 'Following the ball…' : ''}</p>
 			${error ? html`<${FormError} error=${error} />` : null}
