@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
-from itertools import islice
 from typing import Any
 
 from app.db.json_columns import Json
@@ -56,6 +55,10 @@ NAMED = 200
 UNEXPECTED = "something went wrong inside the server; its log says what"
 _A_GROUP = 10
 """Of them, in one group."""
+_STAMPS = frozenset({"solver_version", "calibration_key", "sentence"})
+"""Of a solution, what says which solver made it, and its words: no figure."""
+_PX, _METRES = ("px", "nearest", "reprojected"), ("_m", "point")
+"""How the names of figures in pixels and in metres end."""
 _KEEP = "compute anew and freeze another version, or keep this one as it was frozen"
 """What to do with numbers that an earlier solver made."""
 
@@ -82,7 +85,8 @@ class VerifyReport:
     """What came of it; ``differences`` are the first ones, ``different`` counts all of them.
 
     ``older_tracks`` are sound tracks that come out differently because another version of the solver made them: that
-    version, by stretch. Each is one difference.
+    version, by stretch. Each is one difference. ``largest_px`` and ``largest_m`` are the largest differences of figures
+    of groups in pixels and metres.
     """
 
     version: str
@@ -94,6 +98,8 @@ class VerifyReport:
     differences: list[VerifyDifference] = field(default_factory=list)
     older_tracks: dict[str, str] = field(default_factory=dict)
     solver_version_now: str = SOLVER_VERSION
+    largest_px: float = 0.0
+    largest_m: float = 0.0
 
     @property
     def ok(self) -> bool:
@@ -110,10 +116,13 @@ class VerifyReport:
     def sentence(self) -> str:
         """The outcome in one sentence, or two where tracks of another version come out differently."""
         older = self._format_older_tracks if self.older_tracks else ""
+        other_solver = self.solver_version != self.solver_version_now
         if self.equal < self.groups:
             why = ""
-            if self.solver_version != self.solver_version_now:
-                why = (
+            if self.largest_m or self.largest_px:
+                why = f", figures by at most {self.largest_m:.3g} m and {self.largest_px:.3g} px"
+            if other_solver:
+                why += (
                     f"; the version was computed by solver {self.solver_version}, "
                     f"this is solver {self.solver_version_now}: {_KEEP}"
                 )
@@ -123,6 +132,12 @@ class VerifyReport:
             )
         if own := self.different - len(self.older_tracks):
             return f"{plural(own, 'value')} of the version itself came out differently.{older}"
+        if other_solver:
+            return (
+                f"The figures of {plural(self.groups, 'group')} are as frozen; only the version of"
+                f" the solver differs: {self.solver_version} then, {self.solver_version_now} now."
+                f"{older}"
+            )
         groups = f"All {self.groups:,} groups" if self.groups != 1 else "The group"
         return f"{groups} and the hash came out as they were frozen.{older}"
 
@@ -154,6 +169,34 @@ class VerifyTask:
     known: Mapping[str, bytes]
     policy: Policy
     splitter: Splitter
+    solver_version: str
+
+
+@dataclass
+class GroupComparison:
+    """What of a group is not as it was frozen: the first differences, and the largest by unit."""
+
+    differences: list[VerifyDifference] = field(default_factory=list)
+    largest_px: float = 0.0
+    largest_m: float = 0.0
+
+    def add(self, item: VerifyDifference) -> None:
+        """Take a difference up."""
+        if len(self.differences) < _A_GROUP:
+            self.differences.append(item)
+        off = _subtract(item.frozen, item.now)
+        name = next((name for name in reversed(item.place.split(".")) if not name.isdigit()), "")
+        if name.endswith(_PX):
+            self.largest_px = max(self.largest_px, off)
+        elif name.endswith(_METRES):
+            self.largest_m = max(self.largest_m, off)
+
+
+def _subtract(frozen: Json, now: Json) -> float:
+    """How far two numbers lie apart; 0 where one is none."""
+    if isinstance(frozen, float | int) and isinstance(now, float | int):
+        return abs(float(frozen) - float(now))
+    return 0.0
 
 
 def verify_version(
@@ -165,7 +208,8 @@ def verify_version(
     """Compute a version from its frozen annotations and compare all of it.
 
     Checked are that every frozen part is there, the digest of every frozen part, the hash of the version, its split, and each
-    solution and calibration: every number of them, bit for bit.
+    solution and calibration: every number of them, bit for bit. Where another version of the solver froze it, its stamps
+    and words are left out.
 
     Args:
         store: The database.
@@ -187,8 +231,10 @@ def verify_version(
     done = 0
     for results in run_tasks(verify_task, _VerifyTasks(store, version, matches), executor):
         for found in results:
-            report.add(found)
-            report.equal += not found
+            report.add(found.differences)
+            report.equal += not found.differences
+            report.largest_px = max(report.largest_px, found.largest_px)
+            report.largest_m = max(report.largest_m, found.largest_m)
         done += len(results)
         if progress is not None:
             progress(done, report.groups)
@@ -232,10 +278,16 @@ def save_verify_failure(store: Store, version_id: int, problem: str, *, actor: s
         save_verification(store, version_id, actor=actor, problem=problem)
 
 
-def verify_task(task: VerifyTask) -> list[list[VerifyDifference]]:
+def verify_task(task: VerifyTask) -> list[GroupComparison]:
     """The differences of each group of a task; runs in a worker."""
     known = {key: decode_calibration(body) for key, body in task.known.items()}
-    return [list(islice(_find_group_differences(row, task, known), _A_GROUP)) for row in task.rows]
+    compared = []
+    for row in task.rows:
+        found = GroupComparison()
+        for item in _find_group_differences(row, task, known):
+            found.add(item)
+        compared.append(found)
+    return compared
 
 
 def _find_version_hash_difference(session: Session, version: Version) -> Iterator[VerifyDifference]:
@@ -327,8 +379,10 @@ class _VerifyTasks:
         known = self._calibrate_static_cameras(
             [thaw_group(value, _decode_shared_values(value, frozen)) for value in annotations]
         )
-        policy = self._version.policy
-        return VerifyTask(rows, frozen, known, policy, self._splitter)
+        version = self._version
+        return VerifyTask(
+            rows, frozen, known, version.policy, self._splitter, version.solver_version
+        )
 
     def _calibrate_static_cameras(self, groups: Sequence[Group]) -> dict[str, bytes]:
         """Calibrations of the static cameras of groups, each computed once."""
@@ -411,17 +465,27 @@ def _find_solution_differences(
     row: VersionGroup, group: Group, task: VerifyTask, known: Mapping[str, Calibration]
 ) -> Iterator[VerifyDifference]:
     encoded = encode_solution(group, solve_group(group, task.policy, known))
+    ignored = _STAMPS if task.solver_version != SOLVER_VERSION else frozenset[str]()
     pairs = [("", task.frozen[row.solution or ""], encoded.body)]
-    for key, body in sorted(encoded.calibrations.items()):
-        frozen = task.frozen.get(CALIBRATION + key)
-        if frozen is None:
-            yield VerifyDifference(row.key, "calibration", None, key)
-        else:
-            pairs.append(("calibration.", frozen, body))
+    if ignored:
+        # Their keys follow from the version of the solver, too.
+        views = decode_frozen_json(task.frozen[row.solution or ""])["views"]
+        for at, (view, key) in enumerate(zip(views, encoded.calibration_keys, strict=True)):
+            then = task.frozen[CALIBRATION + view["calibration_key"]]
+            pairs.append((f"views.{at}.calibration.", then, encoded.calibrations[key]))
+    else:
+        for key, body in sorted(encoded.calibrations.items()):
+            frozen = task.frozen.get(CALIBRATION + key)
+            if frozen is None:
+                yield VerifyDifference(row.key, "calibration", None, key)
+            else:
+                pairs.append(("calibration.", frozen, body))
     for place, then, now in pairs:
         # Texts, not bytes: another zlib may pack the same text in another way.
         if decode_frozen_text(then) != decode_frozen_text(now):
-            yield from _find_unequal_leaves(row.key, place, _parse_frozen(then), _parse_frozen(now))
+            yield from _find_unequal_leaves(
+                row.key, place, _parse_frozen(then), _parse_frozen(now), ignored
+            )
     point = decode_frozen_json(encoded.body)["ball"]
     if row.ball != (tuple(point["point"]) if point else None):
         yield VerifyDifference(row.key, "ball", row.ball, point and point["point"])
@@ -437,14 +501,16 @@ def _parse_frozen(body: bytes) -> Json:
 
 
 def _find_unequal_leaves(
-    group: str, place: str, then: Json, now: Json
+    group: str, place: str, then: Json, now: Json, ignored: frozenset[str]
 ) -> Iterator[VerifyDifference]:
-    """Leaves at which two JSON values differ."""
+    """Leaves at which two JSON values differ, but for those of ignored names."""
     if isinstance(then, dict) and isinstance(now, dict) and then.keys() == now.keys():
-        for name in then:
-            yield from _find_unequal_leaves(group, f"{place}{name}.", then[name], now[name])
+        for name in (name for name in then if name not in ignored):
+            yield from _find_unequal_leaves(
+                group, f"{place}{name}.", then[name], now[name], ignored
+            )
     elif isinstance(then, list) and isinstance(now, list) and len(then) == len(now):
         for index, (one, other) in enumerate(zip(then, now, strict=True)):
-            yield from _find_unequal_leaves(group, f"{place}{index}.", one, other)
+            yield from _find_unequal_leaves(group, f"{place}{index}.", one, other, ignored)
     elif repr(then) != repr(now):
         yield VerifyDifference(group, place.rstrip("."), then, now)

@@ -16,6 +16,7 @@ from app.features.versions.freeze import FreezeRequest, freeze_dataset
 from app.features.versions.frozen_queries import compress_text, decode_frozen_text
 from app.features.versions.verify import verify_version
 from app.soccer.solution import Solution
+from app.solving import calibrate, solve
 from app.solving.solve import NO_CALIBRATIONS, solve_group
 from tests.databases import said_for_sqlite
 
@@ -33,6 +34,12 @@ def one_bit_off(group, policy, calibrations: Mapping = NO_CALIBRATIONS) -> Solut
 
 def broken(group, policy, calibrations: Mapping = NO_CALIBRATIONS) -> Solution:
     raise ZeroDivisionError
+
+
+def upgrade(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From now on the solver has another version."""
+    for module in (verify_module, calibrate, solve):
+        monkeypatch.setattr(module, "SOLVER_VERSION", "99")
 
 
 @pytest.fixture
@@ -77,6 +84,34 @@ class TestVerify:
         places = {item.place for item in report.differences}
         assert "ball.point.0" in places
         assert {item.group[-5:] for item in report.differences} == {"8.png"}
+
+    def test_another_solver_with_the_same_figures_differs_in_nothing(
+        self, store, version, monkeypatch
+    ) -> None:
+        upgrade(monkeypatch)
+        report = verify_version(store, version.id)
+        report.solver_version_now = "99"
+        assert report.ok, report.to_values()
+        assert report.sentence.startswith("The figures of 4 groups are as frozen; only the version")
+
+    def test_the_largest_difference_of_another_solver_is_told(
+        self, store, version, monkeypatch
+    ) -> None:
+        def moved(group, policy, calibrations: Mapping = NO_CALIBRATIONS) -> Solution:
+            solution = solve_group(group, policy, calibrations)
+            if not group.key.endswith("8.png"):
+                return solution
+            x, y, z = solution.ball.point
+            return replace(solution, ball=replace(solution.ball, point=(x + 0.25, y, z)))
+
+        upgrade(monkeypatch)
+        monkeypatch.setattr(verify_module, "solve_group", moved)
+        report = verify_version(store, version.id)
+        report.solver_version_now = "99"
+        assert {item.place for item in report.differences} == {"ball.point.0", "ball"}
+        assert report.sentence.startswith(
+            "1 of 4 groups came out differently, figures by at most 0.25 m and 0 px; the version"
+        )
 
     def test_a_group_that_breaks_does_not_hide_the_others(
         self, store, version, monkeypatch
