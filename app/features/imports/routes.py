@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine
+from contextlib import suppress
 from functools import partial
 from typing import Annotated, Any, TypeVar
 
@@ -12,7 +13,7 @@ from anyio.lowlevel import RunVar
 from fastapi import APIRouter, Path, Query, Request, Response
 from starlette.requests import ClientDisconnect
 
-from app.errors import InputError, OverloadedError
+from app.errors import InputError, OverloadedError, ReviewError
 from app.features.imports.jobs import request_import
 from app.features.imports.schemas import FolderDocument, ImportBody, UploadDocument, UploadList
 from app.features.imports.upload_queries import Upload, UploadWriter
@@ -37,6 +38,7 @@ from app.http.documents import make_empty_response, respond_with
 from app.http.permissions import Action, OwnedKind, RoleScope, may
 from app.http.problem import responses
 from app.http.request_limits import TRANSFER, limit
+from app.http.requests import BodyError
 from app.http.route import Route
 from app.json_text import MAX_ID
 
@@ -101,6 +103,8 @@ DISK_THREADS = 1
 flood of uploads an editor's slowest answers took 3.0 to 3.8 times as long as alone with two, and take
 2.4 to 2.8 times as long with one."""
 _THREADS: RunVar[CapacityLimiter] = RunVar("threads of uploads")
+DISCARD_SECONDS = 5.0
+"""So long the rest of a refused file is read before the answer."""
 LOOK_SECONDS = 0.25
 """Between two looks whether the server stops."""
 UploadId = Annotated[str, Path(max_length=64)]
@@ -205,6 +209,30 @@ async def _receive_upload(
     at_once: int = CHUNK,
 ) -> Upload:
     """Write what comes, off the event loop; of what does not come whole, what its writer leaves there."""
+    try:
+        return await _write_upload(request, services, begin, finish, at_once)
+    except ReviewError:
+        if not services.stopping.is_set():
+            await _discard_rest(request)
+        raise
+
+
+async def _discard_rest(request: Request) -> None:
+    """Read what a client still sends: one that sends reads no answer, and finds the connection reset."""
+    # RuntimeError: there is no rest.
+    with suppress(TimeoutError, ClientDisconnect, BodyError, RuntimeError):
+        async with asyncio.timeout(DISCARD_SECONDS):
+            async for _ in request.stream():
+                pass
+
+
+async def _write_upload(
+    request: Request,
+    services: Services,
+    begin: Callable[[], Writer],
+    finish: Callable[[Writer], Upload],
+    at_once: int,
+) -> Upload:
     writer = await _run_in_disk_thread(begin)
     writing = asyncio.ensure_future(_write_body(request, writer, at_once))
     try:

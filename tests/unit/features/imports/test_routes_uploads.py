@@ -86,6 +86,36 @@ class TestUploadFile:
         answer = api.post("/api/v1/imports", content=b"x", headers=BYTES)
         assert answer.status_code == 415
 
+    def test_the_rest_of_a_refused_file_is_read_before_the_answer(self, app, api) -> None:
+        gone, read = f"{API}/{'0' * 32}", 0
+        answered: list[Any] = []
+
+        async def receive() -> dict[str, Any]:
+            nonlocal read
+            read += 1
+            assert not answered
+            return {"type": "http.request", "body": b"x" * 100_000, "more_body": read < 50}
+
+        async def send(message: dict[str, Any]) -> None:
+            answered.append(message)
+
+        headers = {"host": "127.0.0.1:8000", "content-length": "5000000", **BYTES}
+        scope = {
+            "type": "http",
+            "http_version": "1.1",
+            "method": "PATCH",
+            "scheme": "http",
+            "path": gone,
+            "raw_path": gone.encode(),
+            "query_string": b"offset=0",
+            "root_path": "",
+            "headers": [(k.lower().encode(), v.encode()) for k, v in headers.items()],
+            "client": ("127.0.0.1", 1),
+            "server": ("127.0.0.1", 8000),
+        }
+        api.portal.call(app, scope, receive, send)
+        assert (answered[0]["status"], read) == (404, 50)
+
     def test_a_full_disk_is_507(self, api, monkeypatch) -> None:
         def full(_: int) -> None:
             raise OSError(errno.ENOSPC, "No space left on device")
