@@ -31,6 +31,7 @@ from app.db.dialects.dialect import (
     translate_storage_errors,
 )
 from app.db.home import find_last_write_time, is_half_written, make_file_access_error
+from app.db.home_paths import find_path_in_home
 from app.db.locks import DatabaseOpenLock
 from app.db.log import verify_chain
 from app.db.recovery.anchor import (
@@ -46,7 +47,9 @@ from app.json_text import json_text
 
 FORMAT, FORMAT_VERSION = "touchline-backup", 1
 DATABASE, MANIFEST = "touchline.db", "manifest.json"
-FRAMES = ("uploads", "recordings", "sample", "practice")
+RECORDINGS = "recordings"
+"""Folder of a home with what was found of recordings, in small files that go with every backup, and frames below."""
+FRAMES = ("uploads", RECORDINGS, "sample", "practice")
 """Folders of a home that hold frames, and the files that were imported from."""
 EXPORTS = ("exports",)
 _CHUNK = 1 << 20
@@ -321,13 +324,13 @@ def _write_zip(
     anchor, rows = examine_database(settings, copy, settings.database_file)
     with closing(pysqlite3.dbapi2.connect(str(copy))) as connection:
         connection.execute("PRAGMA journal_mode=DELETE")
-        elsewhere = _count_frames_elsewhere(connection, [settings.home / name for name in folders])
+        elsewhere = _count_frames_elsewhere(connection, settings.home.absolute(), folders)
     files: dict[str, dict[str, int | str]] = {}
     handle = os.open(partial, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
     with os.fdopen(handle, "w+b") as file:
         with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=_QUICK) as backup:
             files[DATABASE] = _add_file(backup, DATABASE, copy, zipfile.ZIP_DEFLATED)
-            for path in _iterate_files_of_folders(settings.home, folders):
+            for path in _iterate_files(settings.home, folders):
                 name = path.relative_to(settings.home).as_posix()
                 # Uploads expire, and exports are deleted, meanwhile.
                 with suppress(FileNotFoundError):
@@ -349,14 +352,16 @@ def _write_zip(
     return manifest
 
 
-def _count_frames_elsewhere(connection: Any, folders: Sequence[Path]) -> int:
+def _count_frames_elsewhere(connection: Any, home: Path, folders: Sequence[str]) -> int:
     statement = "SELECT DISTINCT media_path FROM view WHERE media_path IS NOT NULL"
-    paths = [Path(path) for (path,) in connection.execute(statement)]
-    return sum(not any(path.is_relative_to(folder) for folder in folders) for path in paths)
+    paths = [Path(find_path_in_home(path, home)) for (path,) in connection.execute(statement)]
+    return sum(not any(path.is_relative_to(home / name) for name in folders) for path in paths)
 
 
-def _iterate_files_of_folders(home: Path, folders: Sequence[str]) -> Iterator[Path]:
-    """Files of folders, in order; half-written ones are nobody's yet."""
+def _iterate_files(home: Path, folders: Sequence[str]) -> Iterator[Path]:
+    """Files of folders, in order, and the small ones of recordings; half-written ones are nobody's yet."""
+    if RECORDINGS not in folders:
+        yield from sorted((home / RECORDINGS).glob("*.npz"))
     for name in folders:
         walk = os.walk(home / name)
         for path in sorted(Path(folder, file) for folder, _, files in walk for file in files):

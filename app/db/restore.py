@@ -6,21 +6,26 @@ import os
 import shutil
 import zipfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
+
+import pysqlite3.dbapi2
 
 from app.config import Settings
 from app.db.backup import (
     DATABASE,
     EXPORTS,
     FRAMES,
+    RECORDINGS,
+    BackupManifest,
     examine_database,
     require_file_database,
     verify_backup,
 )
 from app.db.home import ASIDE, FOLDER_MODE, RESTORING, make_file_access_error, make_home_private
+from app.db.home_paths import find_path_in_home
 from app.db.locks import hold_exclusive_database_lock, hold_server_lock
 from app.db.migrate import KNOWN_REVISIONS, newer_schema_error
 from app.db.recovery.anchor import DatabaseAnchor, find_anchor_file, write_anchor
@@ -32,6 +37,9 @@ from app.db.recovery.preopen_check import (
 )
 from app.durable import sync_to_disk
 from app.errors import DamagedError, InputError
+
+_HAS_RECORDINGS = "SELECT 1 FROM sqlite_master WHERE name = 'recording'"
+_STAMPS = "SELECT path, stamp, sha256 FROM recording WHERE stamp IS NOT NULL"
 
 
 @dataclass(frozen=True)
@@ -90,23 +98,25 @@ def restore_database(settings: Settings, source: Path) -> RestoreResult:
 
 def _restore_through_folder(settings: Settings, source: Path, folder: Path) -> RestoreResult:
     if zipfile.is_zipfile(source):
-        expected, foreign_log = _unpack_backup(source, folder), False
+        manifest, foreign_log = _unpack_backup(source, folder), False
     else:
-        expected, foreign_log = None, _copy_database_and_own_log(source, folder)
+        manifest, foreign_log = None, _copy_database_and_own_log(source, folder)
     anchor, rows = examine_database(settings, folder / DATABASE, source)
     if anchor.schema not in KNOWN_REVISIONS:
         raise newer_schema_error(anchor.schema, settings)
-    if expected not in (None, (anchor.entries, anchor.hash)):
-        raise DamagedError(
-            f"the log in the backup {source} differs from the log that its manifest describes"
-        )
+    if manifest is not None:
+        if (manifest.entries, manifest.hash) != (anchor.entries, anchor.hash):
+            raise DamagedError(
+                f"the log in the backup {source} differs from the log that its manifest describes"
+            )
+        _set_times_of_recordings(folder, manifest)
     files = sum(1 for path in folder.rglob("*") if path.is_file()) - 1
     # The files of the backup, and those of its database's log, which SQLite may have left.
     os.sync()
     # Exports are called after their jobs, whose ids another database may give to others.
-    replaced = {*EXPORTS, *(path.name for path in folder.iterdir() if path.is_dir())}
-    aside = _move_replaced_files_aside(settings, sorted(replaced))
-    _move_into_home(settings, folder, anchor)
+    restored = _list_restored_paths(folder)
+    aside = _move_replaced_files_aside(settings, sorted({*EXPORTS, *restored}))
+    _move_into_home(settings, folder, restored, anchor)
     make_home_private(settings)
     return RestoreResult(
         settings.home, anchor.schema, anchor.entries, rows, files, aside, foreign_log
@@ -124,8 +134,8 @@ def _temporary_folder(settings: Settings) -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _unpack_backup(source: Path, folder: Path) -> tuple[int, str]:
-    """Unpack a backup that is what was written; returns length and end of its log."""
+def _unpack_backup(source: Path, folder: Path) -> BackupManifest:
+    """Unpack a backup that is what was written."""
     manifest = verify_backup(source)
     with zipfile.ZipFile(source) as backup:
         for name in manifest.files:
@@ -134,7 +144,35 @@ def _unpack_backup(source: Path, folder: Path) -> tuple[int, str]:
             handle = os.open(target, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
             with backup.open(name) as member, os.fdopen(handle, "wb") as file:
                 shutil.copyfileobj(member, file)
-    return manifest.entries, manifest.hash
+    return manifest
+
+
+def _set_times_of_recordings(folder: Path, manifest: BackupManifest) -> None:
+    """Give the files of recordings the times by which their recordings know them."""
+    with closing(pysqlite3.dbapi2.connect(str(folder / DATABASE))) as connection:
+        if not connection.execute(_HAS_RECORDINGS).fetchone():
+            return
+        rows = connection.execute(_STAMPS).fetchall()
+    for path, stamp, sha256 in rows:
+        file = Path(find_path_in_home(path, folder))
+        if file.is_relative_to(folder):
+            size, time = map(int, stamp.split())
+            known = manifest.files[file.relative_to(folder).as_posix()]
+            if known == {"bytes": size, "sha256": sha256}:
+                os.utime(file, ns=(time, time))
+
+
+def _list_restored_paths(folder: Path) -> list[str]:
+    """Files and folders of a home that a backup has, each with all below it."""
+    found = []
+    for path in sorted(folder.iterdir()):
+        # Without its frames the folder holds a part of what the home may have.
+        inside = sorted(path.iterdir()) if path.name == RECORDINGS else []
+        if inside and all(file.is_file() for file in inside):
+            found += [f"{RECORDINGS}/{file.name}" for file in inside]
+        elif path.is_dir():
+            found.append(path.name)
+    return found
 
 
 def _safe_member_path(name: str, source: Path) -> PurePosixPath:
@@ -166,21 +204,20 @@ def _copy_database_and_own_log(source: Path, folder: Path) -> bool:
     return log.commits > 0
 
 
-def _move_replaced_files_aside(settings: Settings, folders: list[str]) -> Path | None:
+def _move_replaced_files_aside(settings: Settings, names: list[str]) -> Path | None:
     """Move what will be replaced into a folder of its own; the anchor stays until the end."""
     database = settings.database_file
-    present = [
-        *database.parent.glob(f"{database.name}*"),
-        *(settings.home / name for name in folders if (settings.home / name).exists()),
-    ]
+    present = {path: path.name for path in database.parent.glob(f"{database.name}*")}
+    present |= {settings.home / name: name for name in names if (settings.home / name).exists()}
     anchor = find_anchor_file(database)
     if not present and not anchor.exists():
         return None
     aside = _make_aside_folder(settings.home)
     if anchor.exists():
         shutil.copy(anchor, aside)
-    for path in present:
-        shutil.move(path, aside / path.name)
+    for path, name in present.items():
+        (aside / name).parent.mkdir(mode=FOLDER_MODE, exist_ok=True)
+        shutil.move(path, aside / name)
     for path in (aside, settings.home, database.parent):
         sync_to_disk(path)
     return aside
@@ -195,13 +232,15 @@ def _make_aside_folder(home: Path) -> Path:
     return folder
 
 
-def _move_into_home(settings: Settings, folder: Path, anchor: DatabaseAnchor) -> None:
+def _move_into_home(
+    settings: Settings, folder: Path, names: list[str], anchor: DatabaseAnchor
+) -> None:
     """The database last: without it nothing is served."""
     # Their marks are those of the changes of another database.
     shutil.rmtree(settings.yields, ignore_errors=True)
-    for path in folder.iterdir():
-        if path.is_dir():
-            shutil.move(path, settings.home / path.name)
+    for name in names:
+        (settings.home / name).parent.mkdir(mode=FOLDER_MODE, exist_ok=True)
+        shutil.move(folder / name, settings.home / name)
     sync_to_disk(settings.home)
     shutil.move(folder / DATABASE, settings.database_file)
     sync_to_disk(settings.database_file.parent)

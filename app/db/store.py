@@ -21,6 +21,7 @@ from app.db.dialects.dialect import (
     translate_storage_errors,
 )
 from app.db.home import create_private_file
+from app.db.home_paths import set_home_of_engine
 from app.db.locks import DatabaseOpenLock
 from app.db.migrate import (
     KNOWN_REVISIONS,
@@ -101,6 +102,9 @@ class Store:
         self.sharing = get_dialect(settings).sharing(
             engine, lambda: translate_storage_errors(settings)
         )
+        for each in (engine, self._peeker, self._passing):
+            if each is not None:
+                set_home_of_engine(each, settings)
         self._lock = lock
         self.turn = turn
         self._listeners: list[Callable[[], None]] = []

@@ -68,7 +68,7 @@ def index_recording(
         TooLargeError: Its frames are larger than the limits, or too many.
     """
     _require_complete_file(path)
-    return _build_index(path, _hash_file(path), settings, tell)
+    return _build_index(path, hash_file(path), settings, tell)
 
 
 def index_without_measuring(path: Path) -> RecordingIndex:
@@ -152,10 +152,12 @@ def _build_index(
     )
 
 
-def _hash_file(path: Path) -> tuple[str, int]:
+def hash_file(path: Path, stop: Callable[[], object] = lambda: None) -> tuple[str, int]:
+    """SHA-256 and size of a file; ``stop`` is called every now and then, what it raises ends it."""
     digest, size = hashlib.sha256(), 0
     with path.open("rb") as file:
         while block := file.read(_BLOCK):
+            stop()
             digest.update(block)
             size += len(block)
     return digest.hexdigest(), size

@@ -36,7 +36,8 @@ from app.db.dialects.dialect import (
     select_json_array_items,
 )
 from app.db.home import DAY, find_last_write_time
-from app.db.json_columns import decompress_json, parse_json_column, translate_shape_errors_to_damage
+from app.db.home_paths import find_stored_path
+from app.db.json_columns import parse_json_column, translate_shape_errors_to_damage
 from app.db.session import COPIES_USED, Session, UsedIdModel
 from app.features.batches.tables import BatchModel
 from app.features.datasets.tables import DatasetModel, GroupModel, StationModel, ViewModel
@@ -52,7 +53,12 @@ from app.features.solutions.queries import CalibrationModel, SolutionModel
 from app.features.tables import Base
 from app.features.tracks.tables import TrackModel
 from app.features.verdicts.tables import VerdictBatchModel, VerdictModel
-from app.features.versions.queries import BATCH, VersionGroupModel, VersionModel
+from app.features.versions.queries import (
+    BATCH,
+    VersionGroupModel,
+    VersionModel,
+    read_frozen_frames,
+)
 from app.json_text import MAX_ID, canonical_json_text
 from app.object_store.path import is_address
 from app.soccer.codec import policy_from_json, policy_to_json
@@ -361,19 +367,17 @@ def _has_unsolved_groups(session: Session) -> bool:
 def list_unused_uploads(session: Session, settings: Settings) -> list[str]:
     """Ids of uploads that are kept for their frames, though no view and no frozen version has a frame
     there and none is a recording."""
-    folders = {folder for path in _find_paths_in_use(session) for folder in path.parents}
+    folders = {name for path in _find_paths_in_use(session) for name in path.parts}
     return [
-        upload.id
-        for upload in list_uploads(settings)
-        if upload.kept and settings.uploads.absolute() / upload.id not in folders
+        upload.id for upload in list_uploads(settings) if upload.kept and upload.id not in folders
     ]
 
 
-def is_upload_in_use(session: Session, settings: Settings, upload_id: str) -> bool:
+def is_upload_in_use(session: Session, upload_id: str) -> bool:
     """Whether a view has its frame in an upload, or it is a recording."""
-    folder = f"{settings.uploads.absolute() / upload_id}/"
+    folder = f"/uploads/{upload_id}/"
     return any(
-        session.scalar(select(column).where(column.startswith(folder, autoescape=True)).limit(1))
+        session.scalar(select(column).where(column.contains(folder, autoescape=True)).limit(1))
         for column in (ViewModel.media_path, RecordingModel.path)
     )
 
@@ -393,16 +397,56 @@ def list_unused_frame_files(session: Session, settings: Settings) -> list[str]:
     )
 
 
+def list_missing_recording_files(session: Session, settings: Settings) -> list[Path]:
+    """Files of the home's recordings that are gone: indices and cameras of recordings, and frames of views."""
+    cameras = ShotCamerasModel
+    names = {
+        f"{digest}{end}"
+        for column, end in (
+            (RecordingModel.sha256, ".npz"),
+            (cameras.digest, ".cameras.npz"),
+            (cameras.before, ".cameras.npz"),
+        )
+        for digest in session.scalars(select(column))
+        if digest
+    }
+    folder = settings.recordings.absolute()
+    frames = {path for path in _find_paths_of_views(session) if _is_of_recording(path)}
+    return sorted(path for path in {folder / name for name in names} | frames if not path.exists())
+
+
+def _is_of_recording(path: Path) -> bool:
+    """Whether a path is that of a frame that a home keeps of a recording, called after its SHA-256."""
+    return path.parent.parent.name == "recordings" and len(path.parent.name) == 64
+
+
+def find_missing_path(session: Session) -> Path | None:
+    """A file that a recording or a view names and that is gone; None: all are there."""
+    paths = {*_find_paths_of_views(session), *_find_paths_of_recordings(session)}
+    return next((path for path in sorted(paths) if not path.exists()), None)
+
+
+def _find_paths_of_views(session: Session) -> set[Path]:
+    statement = select(ViewModel.media_path).where(ViewModel.media_path.is_not(None)).distinct()
+    found = (path for path in session.scalars(statement) if path and not is_address(path))
+    return {Path(find_stored_path(session, path)) for path in found}
+
+
+def _find_paths_of_recordings(session: Session) -> set[Path]:
+    paths = session.scalars(select(RecordingModel.path))
+    return {Path(find_stored_path(session, path)) for path in paths}
+
+
 def _find_paths_in_use(session: Session) -> set[Path]:
     """Where frames of views, of frozen versions and of recordings lie on this disk."""
-    statement = select(ViewModel.media_path).where(ViewModel.media_path.is_not(None)).distinct()
-    found = {*session.scalars(statement), *session.scalars(select(RecordingModel.path))}
+    found = {*_find_paths_of_views(session), *_find_paths_of_recordings(session)}
     frozen = select(VersionGroupModel.frames).where(VersionGroupModel.frames.is_not(None))
     # A group may be gone, or have other frames by now; its versions are exported with theirs.
     for body in session.scalars(frozen.execution_options(yield_per=BATCH)):
-        frames = decompress_json(body or b"").values()
-        found |= {frame["path"] for frame in frames if "path" in frame}
-    return {Path(path) for path in found if path and not is_address(path)}
+        frames = read_frozen_frames(session, body or b"").values()
+        paths = {frame["path"] for frame in frames if "path" in frame}
+        found |= {Path(path) for path in paths if not is_address(path)}
+    return found
 
 
 def delete_expired_cache_entries(settings: Settings) -> int:

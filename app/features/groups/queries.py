@@ -12,6 +12,7 @@ from sqlalchemy import BindParameter, bindparam, null, or_, select
 from sqlalchemy.sql import FromClause
 
 from app.db.dialects.dialect import insert, select_from_number_list, select_from_text_list
+from app.db.home_paths import find_stored_path
 from app.db.json_columns import decompress_json, parse_json_column, translate_shape_errors_to_damage
 from app.db.session import Session
 from app.errors import NotFoundError
@@ -138,7 +139,9 @@ def read_groups(
     named = {d for row in heads.values() for d in read_paint_digests(row.paint).values()}
     readings = read_paint_readings(session, named) if named else {}
     return {
-        number: _build_stored_group(heads[number], views.get(number, []), stations, readings)
+        number: _build_stored_group(
+            session, heads[number], views.get(number, []), stations, readings
+        )
         for number in ids
         if number in heads
     }
@@ -189,6 +192,7 @@ def find_views(
 
 
 def _build_stored_group(
+    session: Session,
     head: Any,
     rows: Sequence[Any],
     stations: Mapping[int, StoredStation],
@@ -196,7 +200,7 @@ def _build_stored_group(
 ) -> StoredGroup:
     group = Group(
         key=head.key,
-        views=tuple(_view_from_row(row, stations[row.station_id].station) for row in rows),
+        views=tuple(_view_from_row(session, row, stations[row.station_id].station) for row in rows),
         match=head.match,
         pitch=Pitch(head.pitch_length, head.pitch_width),
         split=head.split,
@@ -222,10 +226,11 @@ def _build_stored_group(
     )
 
 
-def _view_from_row(row: Any, station: Station) -> View:
+def _view_from_row(session: Session, row: Any, station: Station) -> View:
     media = None
     if row.media_path is not None:
-        media = Media(row.media_path, row.media_member, row.media_frame)
+        path = find_stored_path(session, row.media_path)
+        media = Media(path, row.media_member, row.media_frame)
     extras, why = row.extras, row.left_out
     return View(
         key=row.key,

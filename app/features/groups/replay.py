@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
+from app.db.home_paths import find_stored_path
 from app.db.json_columns import compress_json
 from app.db.log import LogEntry, read_log, verify_chain
 from app.db.session import Session
@@ -54,6 +55,11 @@ def replay_log(session: Session) -> StateSnapshot:
         if entry.kind == "import" and entry.group_id not in snapshot.groups:
             numbers[entry.dataset_id or 0] += 1
         apply_entry(snapshot, entry, numbers[entry.dataset_id or 0])
+    for record in snapshot.groups.values():
+        for item in record.views:
+            if item.view.media is not None:
+                path = find_stored_path(session, item.view.media.path)
+                item.view = replace(item.view, media=replace(item.view.media, path=path))
     return snapshot
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeVar
 
 from sqlalchemy import ColumnElement, select, update
 
 from app.db.dialects.dialect import select_from_number_list
+from app.db.home_paths import find_stored_path
 from app.db.json_columns import parse_json_column, translate_shape_errors_to_damage
 from app.db.session import Session
 from app.features.datasets.tables import GroupModel, StationModel, ViewModel
@@ -26,6 +27,8 @@ from app.soccer.group import Media, Station
 from app.soccer.picture import PictureGeometry
 from app.soccer.pitch import Pitch
 
+FrameRow = TypeVar("FrameRow", "StoredView", "ViewFileFields")
+
 
 class _FrameRow:
     """A row with the place of a frame."""
@@ -40,6 +43,15 @@ class _FrameRow:
         if self.media_path is None:
             return None
         return Media(self.media_path, self.media_member, self.media_frame)
+
+
+def _find_frames(session: Session, rows: list[FrameRow]) -> list[FrameRow]:
+    """Rows with the places where their files lie in this home."""
+    found = []
+    for row in rows:
+        path = row.media_path and find_stored_path(session, row.media_path)
+        found.append(row if path == row.media_path else replace(row, media_path=path))
+    return found
 
 
 @dataclass(frozen=True)
@@ -135,7 +147,7 @@ def list_view_file_fields(session: Session, group_ids: Sequence[int]) -> list[Vi
         .order_by(group.number, view.position)
     )  # fmt: skip
     rows: Iterable[Any] = session.execute(statement)
-    return [ViewFileFields(*row) for row in rows]
+    return _find_frames(session, [ViewFileFields(*row) for row in rows])
 
 
 def list_frame_files(session: Session, dataset_id: int) -> list[str]:
@@ -143,7 +155,7 @@ def list_frame_files(session: Session, dataset_id: int) -> list[str]:
     statement = select(ViewModel.media_path).where(ViewModel.media_path.is_not(None)).distinct()
     statement = statement.join(GroupModel, GroupModel.id == ViewModel.group_id)
     found = session.scalars(statement.where(GroupModel.dataset_id == dataset_id))
-    return [path for path in found if path is not None]
+    return [find_stored_path(session, path) for path in found if path is not None]
 
 
 def list_group_views(session: Session, group_id: int) -> list[StoredView]:
@@ -213,7 +225,7 @@ def _read_views(session: Session, *where: ColumnElement[bool]) -> list[StoredVie
         .order_by(group.number, view.position)
     )  # fmt: skip
     rows: Iterable[Any] = session.execute(statement)
-    return [StoredView(*row) for row in rows]
+    return _find_frames(session, [StoredView(*row) for row in rows])
 
 
 @dataclass(frozen=True)

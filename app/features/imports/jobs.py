@@ -180,7 +180,7 @@ def _keep_upload_in_use(store: Store, request: ImportRequest) -> Iterator[None]:
         yield
     finally:
         with store.read() as session:
-            used = is_upload_in_use(session, settings, upload)
+            used = is_upload_in_use(session, upload)
         # One that was kept before is another's to release, who may be at work with it.
         if used or marked:
             mark_upload_permanent(settings, upload, kept=used)

@@ -32,6 +32,8 @@ from app.db.store import Store
 from app.errors import ConflictError, DamagedError, InputError, ReviewError, StorageError
 from app.features.comments.service import examine_threads
 from app.features.datasets.queries import (
+    find_missing_path,
+    list_missing_recording_files,
     list_unused_calibrations,
     list_unused_frame_files,
     list_unused_uploads,
@@ -468,7 +470,9 @@ def _check_unused_uploads(session: Session, settings: Settings) -> CheckResult:
     except DamagedError as error:
         return _unknown_use("uploads", error)
     sentence = f"{len(found):,} kept for frames that no dataset reads"
-    advice = f"Delete the folder {settings.uploads / found[0]}, and the others." if found else None
+    advice = (
+        _advise_deleting(session, f"the folder {settings.uploads / found[0]}") if found else None
+    )
     return CheckResult("uploads", True, sentence, advice)
 
 
@@ -477,9 +481,25 @@ def _check_unused_frame_files(session: Session, settings: Settings) -> CheckResu
         found = list_unused_frame_files(session, settings)
     except DamagedError as error:
         return _unknown_use("recordings", error)
+    if missing := list_missing_recording_files(session, settings):
+        more = " and others" if missing[1:] else ""
+        sentence = f"{plural(len(missing), 'file')} of recordings missing: {missing[0]}{more}"
+        return CheckResult("recordings", False, sentence, MAKE_AGAIN)
     sentence = f"{len(found):,} indices and folders of frames that nothing uses"
-    advice = f"Delete {settings.recordings / found[0]}, and the others." if found else None
+    advice = _advise_deleting(session, str(settings.recordings / found[0])) if found else None
     return CheckResult("recordings", True, sentence, advice)
+
+
+MAKE_AGAIN = (
+    "Restore a backup made with --with-frames. Or index the recording again (.npz), track its shots"
+    " again (.cameras.npz), or make its groups again (.png)."
+)
+
+
+def _advise_deleting(session: Session, first: str) -> str:
+    if missing := find_missing_path(session):
+        return f"Delete nothing: {missing} is missing, which a recording or a view names."
+    return f"Delete {first}, and the others."
 
 
 def _unknown_use(name: str, error: DamagedError) -> CheckResult:

@@ -21,8 +21,9 @@ from app.errors import (
     TooLargeError,
 )
 from app.features.audit.service import add_audit_event
-from app.features.recordings.queries import delete_links, update_recording
+from app.features.recordings.queries import RecordingRow, delete_links, update_recording
 from app.features.recordings.service import (
+    PUT_BACK,
     Details,
     Recording,
     build_recording_from_row,
@@ -30,6 +31,10 @@ from app.features.recordings.service import (
     clock_readings_from_column,
     clock_readings_to_column,
     compute_file_stamp,
+    differs_in_time_alone,
+    find_video_file,
+    get_recording,
+    index_file_path,
     require_recording,
 )
 from app.geometry.arrays import FloatArray
@@ -37,7 +42,7 @@ from app.json_text import canonical_json_text
 from app.media.frames import make_picture_error
 from app.progress import ReportProgress
 from app.video.index import RecordingIndex, index_from_bytes, index_to_bytes, read_index_seconds
-from app.video.indexing import index_recording
+from app.video.indexing import hash_file, index_recording
 from app.video.shots import find_shots_of_indexed_recording
 from app.worker_process import COUNTS, WorkerEnded, WorkerLimits, WorkerProcess
 
@@ -73,10 +78,16 @@ def index_recording_in_worker(
     """
     with store.read() as session:
         row = require_recording(session, recording_id)
-    path = Path(row.path)
+    path = find_video_file(store.settings, row)
     stamp = compute_file_stamp(path)
     if stamp is None:
-        raise NotFoundError(f"{path.name} is no longer in the place that it was imported from")
+        raise NotFoundError(
+            f"{path.name} is no longer in the place that it was imported from", hint=PUT_BACK
+        )
+    if _is_copy_with_another_time(store.settings, row, stamp, stop):
+        with store.write() as session:
+            update_recording(session, recording_id, stamp=stamp)
+        return get_recording(store, recording_id)
     try:
         facts, shots = run_in_worker(
             path, index_recording_file, store.settings, progress=progress, stop=stop
@@ -115,7 +126,20 @@ def index_recording_in_worker(
             what = {"recording": recording_id, "name": row.name, "clocks": gone}
             add_audit_event(session, actor, "match clocks removed", row.dataset_id, **what)
         update_recording(session, recording_id, **found)
-        return build_recording_from_row(require_recording(session, recording_id))
+        return build_recording_from_row(require_recording(session, recording_id), store.settings)
+
+
+def _is_copy_with_another_time(
+    settings: Settings, row: RecordingRow, stamp: str, stop: Callable[[], None]
+) -> bool:
+    """Whether the file of an indexed recording is the same, byte for byte, and was written anew."""
+    if row.sha256 is None or row.stamp is None or not differs_in_time_alone(row.stamp, stamp):
+        return False
+    try:
+        read_index_seconds(index_file_path(settings, row.sha256))
+    except (InputError, OSError):
+        return False
+    return hash_file(find_video_file(settings, row), stop)[0] == row.sha256
 
 
 def run_in_worker(
@@ -178,11 +202,6 @@ def _detect_shots(path: Path, index: RecordingIndex, send: Send) -> list[dict[st
         }
         for one in found
     ]
-
-
-def index_file_path(settings: Settings, sha256: str) -> Path:
-    """Where the index of a recording lies."""
-    return settings.recordings / f"{sha256}.npz"
 
 
 def read_index(settings: Settings, sha256: str) -> RecordingIndex:

@@ -10,9 +10,10 @@ import numpy as np
 
 from app.config import Settings
 from app.db.store import Store
-from app.features.recordings.index import index_file_path, read_index_file
+from app.features.recordings.index import read_index_file
 from app.features.recordings.link_values import LinkedShot, ShotLink
 from app.features.recordings.links import compute_frame_interval, read_shot_times, require_link
+from app.features.recordings.service import index_file_path
 from app.geometry.arrays import BoolArray, FloatArray, IntArray
 from app.video.repeats import find_blended_frames, find_repeated_frames
 

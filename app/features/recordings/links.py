@@ -99,7 +99,7 @@ def add_link(
     """
     with store.write() as session:
         sides = [
-            _require_shot(session, *side, pointer=f"/{name}")
+            _require_shot(session, store.settings, *side, pointer=f"/{name}")
             for name, side in (("live", live), ("replay", replay))
         ]
         if sides[0].dataset_id != sides[1].dataset_id:
@@ -149,10 +149,10 @@ def _get_live_and_replay_frames(row: Any) -> tuple[tuple[int, int, int], tuple[i
 
 
 def _require_shot(
-    session: Session, recording: int, first: int, last: int, pointer: str
+    session: Session, settings: Settings, recording: int, first: int, last: int, pointer: str
 ) -> RecordingRow:
     row = require_recording(session, recording)
-    found = build_recording_from_row(row)
+    found = build_recording_from_row(row, settings)
     if found.frames is None:
         found.require_readable()
     frames = found.frames or 0

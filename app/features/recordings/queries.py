@@ -77,8 +77,8 @@ def find_recording(session: Session, recording_id: int) -> RecordingRow | None:
 
 
 def list_names_and_paths(session: Session, dataset_id: int) -> Sequence[Any]:
-    """``id``, ``name``, ``path`` and ``sha256`` of a dataset's recordings."""
-    columns = (RecordingModel.id, RecordingModel.name, RecordingModel.path, RecordingModel.sha256)
+    """``id``, ``name``, ``path`` and ``stamp`` of a dataset's recordings."""
+    columns = (RecordingModel.id, RecordingModel.name, RecordingModel.path, RecordingModel.stamp)
     return session.execute(select(*columns).where(RecordingModel.dataset_id == dataset_id)).all()
 
 

@@ -12,6 +12,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from app.config import Settings
+from app.db.home_paths import find_path_in_home
 from app.db.idempotency import without_pending_response
 from app.db.json_columns import parse_json_column
 from app.db.session import Session
@@ -39,6 +41,10 @@ from app.soccer.policy import TOUCHLINE
 
 Details = dict[str, str | int | None]
 """What an event of the log says of a recording."""
+PUT_BACK = (
+    "Put the file back, or add it under the same name from where it lies now: its groups and shots"
+    " belong to it again."
+)
 _UNSAFE = re.compile(r"[^\w .()-]+")
 
 
@@ -93,9 +99,10 @@ class Recording:
             ConflictError: It is not indexed yet, is gone, or is another one by now.
         """
         if self.sha256 is None or self.problem is not None:
+            hint = "Index it again." if self.problem else "Wait for the job that indexes it."
             raise ConflictError(
                 self.problem or f'the recording "{self.name}" is not indexed yet',
-                hint="Index it again." if self.problem else "Wait for the job that indexes it.",
+                hint=hint if compute_file_stamp(self.path) else PUT_BACK,
             )
         return self.sha256
 
@@ -103,7 +110,8 @@ class Recording:
 def list_recordings(store: Store, dataset_id: int | None = None) -> list[Recording]:
     """The recordings of a dataset, or of all, the newest first."""
     with store.read() as session:
-        return [build_recording_from_row(row) for row in list_recording_rows(session, dataset_id)]
+        rows = list_recording_rows(session, dataset_id)
+        return [build_recording_from_row(row, store.settings) for row in rows]
 
 
 def get_recording(store: Store, recording_id: int) -> Recording:
@@ -113,7 +121,7 @@ def get_recording(store: Store, recording_id: int) -> Recording:
         NotFoundError: There is none.
     """
     with store.read() as session:
-        return build_recording_from_row(require_recording(session, recording_id))
+        return build_recording_from_row(require_recording(session, recording_id), store.settings)
 
 
 def require_recording(session: Session, recording_id: int) -> RecordingRow:
@@ -125,7 +133,7 @@ def require_recording(session: Session, recording_id: int) -> RecordingRow:
 
 
 def add_recording(store: Store, dataset: str, path: Path, *, actor: str) -> Recording:
-    """A recording for a file, which is the same again where it was added before.
+    """A recording for a file, which is the same again where it was added before, or was moved since.
 
     Args:
         store: The database.
@@ -142,13 +150,29 @@ def add_recording(store: Store, dataset: str, path: Path, *, actor: str) -> Reco
         if number is None:
             number = insert_dataset(session, dataset, TOUCHLINE, actor)
         known = list_names_and_paths(session, number)
-        there = next((row.id for row in known if row.path == str(path)), None)
-        if there is None:
+        settings = store.settings
+        same = next((row for row in known if find_video_file(settings, row) == path), None)
+        moved = next((row for row in known if _is_moved(settings, row, path)), None)
+        if same is not None:
+            return build_recording_from_row(require_recording(session, same.id), settings)
+        if moved is not None:
+            there, name = moved.id, moved.name
+            # Whether it is the same film, indexing says.
+            update_recording(session, there, path=str(path))
+        else:
             taken = {row.name for row in known} | list_match_names(session, number)
             name = _make_unused_name(path.stem, taken)
             there = insert_recording(session, number, name, str(path), actor=actor)
-            add_audit_event(session, actor, "recording added", number, recording=there, name=name)
-        return build_recording_from_row(require_recording(session, there))
+        add_audit_event(session, actor, "recording added", number, recording=there, name=name)
+        return build_recording_from_row(require_recording(session, there), settings)
+
+
+def _is_moved(settings: Settings, row: Any, path: Path) -> bool:
+    """Whether the file of a recording is gone, and another path leads to one of its name and size."""
+    before, present = find_video_file(settings, row), compute_file_stamp(path)
+    if before.name != path.name or compute_file_stamp(before) or not (row.stamp and present):
+        return False
+    return _size_of_stamp(row.stamp) == _size_of_stamp(present)
 
 
 def require_name_for_recordings(store: Store, dataset: str) -> None:
@@ -202,7 +226,9 @@ def set_clock_readings(
             update_recording(session, recording_id, clocks=text)
             what: Details = {"recording": recording_id, "name": row.name, "clocks": len(found)}
             add_audit_event(session, actor, "match clock set", row.dataset_id, **what)
-        recording = build_recording_from_row(require_recording(session, recording_id))
+        recording = build_recording_from_row(
+            require_recording(session, recording_id), store.settings
+        )
         session.respond(recording)
     return recording
 
@@ -254,9 +280,9 @@ def map_frames_to_group_keys(keys: Iterable[str]) -> dict[int, str]:
     return found
 
 
-def build_recording_from_row(row: RecordingRow) -> Recording:
+def build_recording_from_row(row: RecordingRow, settings: Settings) -> Recording:
     """The recording of a row."""
-    path = Path(row.path)
+    path = find_video_file(settings, row)
     facts: Mapping[str, Any] = {} if row.facts is None else parse_json_column(row.facts)
     names = ("bytes", "frames", "fps", "variable", "seconds")
     shape = ("width", "height", "rotation", "interlaced", "damaged")
@@ -273,11 +299,16 @@ def build_recording_from_row(row: RecordingRow) -> Recording:
         groups=int(row.groups),
         problem=facts.get("problem")
         if row.stamp is None
-        else _describe_file_problem(path, row.stamp),
+        else _describe_file_problem(path, row.stamp, index_file_path(settings, row.sha256 or "")),
         actor=row.actor,
         created=row.created,
         clocks=clock_readings_from_column(row.clocks),
     )
+
+
+def find_video_file(settings: Settings, row: Any) -> Path:
+    """Where the file of a recording lies, by the ``path`` of its row."""
+    return Path(find_path_in_home(row.path, settings.home.absolute()))
 
 
 def clock_readings_from_column(text: str | None) -> tuple[MatchClockReading, ...]:
@@ -290,11 +321,18 @@ def clock_readings_to_column(clocks: Sequence[MatchClockReading]) -> str | None:
     return canonical_json_text([asdict(clock) for clock in clocks]) if clocks else None
 
 
-def _describe_file_problem(path: Path, stamp: str) -> str | None:
+def _describe_file_problem(path: Path, stamp: str, index: Path) -> str | None:
     present = compute_file_stamp(path)
     if present is None:
         return f"{path.name} is no longer in the place that it was imported from"
-    return None if present == stamp else f"{path.name} has changed since it was indexed"
+    if present != stamp:
+        return f"{path.name} has changed since it was indexed"
+    return None if index.exists() else f"the index of {path.name} is missing"
+
+
+def index_file_path(settings: Settings, sha256: str) -> Path:
+    """Where the index of a recording lies."""
+    return settings.recordings / f"{sha256}.npz"
 
 
 def compute_file_stamp(path: Path) -> str | None:
@@ -308,6 +346,15 @@ def compute_file_stamp(path: Path) -> str | None:
         if path.is_file() and not path.is_symlink()
         else None
     )
+
+
+def differs_in_time_alone(stamp: str, other: str) -> bool:
+    """Whether two stamps are of files of one size, written at different times."""
+    return stamp != other and _size_of_stamp(stamp) == _size_of_stamp(other)
+
+
+def _size_of_stamp(stamp: str) -> str:
+    return stamp.partition(" ")[0]
 
 
 def _make_unused_name(stem: str, taken: set[str]) -> str:

@@ -151,7 +151,7 @@ def _validate_shots(shots: Sequence[Shot], frames: int) -> None:
 
 
 def _build_recording_shots(settings: Settings, row: RecordingRow) -> RecordingShots:
-    recording = build_recording_from_row(row)
+    recording = build_recording_from_row(row, settings)
     items = tuple(Shot(**shot) for shot in parse_json_column(row.shots))
     times: tuple[tuple[float, float], ...] = ()
     if items and recording.sha256 is not None:

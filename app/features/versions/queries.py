@@ -15,6 +15,7 @@ from sqlalchemy import ForeignKey, LargeBinary, Table, UniqueConstraint, func, i
 from sqlalchemy.orm import Mapped, mapped_column
 
 from app.db.dialects.dialect import insert_or_replace
+from app.db.home_paths import find_stored_path
 from app.db.json_columns import Json, decompress_json, parse_json_column
 from app.db.session import Base, Session, now
 from app.db.store import Store
@@ -270,7 +271,7 @@ def read_page(
         .order_by(model.position)
         .limit(limit)
     )
-    return [_version_group_from_row(row) for row in session.execute(statement)]
+    return [_version_group_from_row(session, row) for row in session.execute(statement)]
 
 
 def iterate_version_group_state_rows(
@@ -342,7 +343,7 @@ def list_candidate_rows(session: Session, dataset_id: int) -> Sequence[Candidate
     return session.rows(CandidateRow, statement)
 
 
-def _version_group_from_row(row: Any) -> VersionGroup:
+def _version_group_from_row(session: Session, row: Any) -> VersionGroup:
     ball = None if row.ball is None else parse_json_column(row.ball)
     return VersionGroup(
         position=row.position,
@@ -356,8 +357,17 @@ def _version_group_from_row(row: Any) -> VersionGroup:
         said=row.said,
         solution=row.solution,
         ball=None if ball is None else (ball[0], ball[1], ball[2]),
-        frames=None if row.frames is None else decompress_json(row.frames),
+        frames=None if row.frames is None else read_frozen_frames(session, row.frames),
     )
+
+
+def read_frozen_frames(session: Session, body: bytes) -> dict[str, dict[str, Any]]:
+    """Where the frames of a frozen group lie, by view, and what they weigh."""
+    frames: dict[str, dict[str, Any]] = decompress_json(body)
+    for frame in frames.values():
+        if "path" in frame:
+            frame["path"] = find_stored_path(session, frame["path"])
+    return frames
 
 
 @dataclass(frozen=True)

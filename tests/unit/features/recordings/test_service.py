@@ -98,6 +98,27 @@ class TestIndexNow:
         third = indexed(store, again)
         assert (third.name, sorted(find_group_ids_by_frame(store, third))) == ("final", [5, 6])
 
+    def test_a_file_that_was_moved_is_added_from_where_it_lies_now(
+        self, store: Store, film: Path, tmp_path: Path
+    ) -> None:
+        first = indexed(store, film)
+        mine = [Shot(0, 9, "main", "start", True)]
+        replace_shots(store, first.id, mine, None, actor="ann")
+        make_groups_of_instants(store, first.id, [5], False, "ann", lambda *_: None)
+        (tmp_path / "moved").mkdir()
+        copied = tmp_path / "moved" / film.name
+        copied.write_bytes(film.read_bytes())
+        # Another recording, as long as the file of the first one is there.
+        assert add_recording(store, "cup", copied, actor="ann").id != first.id
+        remove_recording(store, first.id + 1, actor="ann")
+        film.unlink()
+        with pytest.raises(ConflictError) as refused:
+            get_recording(store, first.id).require_readable()
+        assert (refused.value.hint or "").startswith("Put the file back, or add it under the same")
+        again = indexed(store, copied, actor="eve")
+        assert (again.id, again.path, again.problem, again.groups) == (first.id, copied, None, 1)
+        assert list(get_shots(store, first.id).items) == mine
+
     def test_groups_of_the_video_before_stay_when_a_file_is_replaced(
         self, store: Store, film: Path
     ) -> None:
