@@ -56,7 +56,10 @@ def backup(
     out: Annotated[Path, typer.Argument(help="A zip that does not exist yet.")],
     with_frames: Annotated[
         bool,
-        typer.Option("--with-frames", help="Uploads, sample and practice frames in the home, too."),
+        typer.Option(
+            "--with-frames",
+            help="Uploads, frames of recordings, sample and practice frames in the home, too.",
+        ),
     ] = False,
     with_exports: Annotated[
         bool, typer.Option("--with-exports", help="Exports made over REST, too.")
