@@ -17,6 +17,7 @@ import { openQueue, queue } from './queue.js';
 /** Why a bulk verdict leaves groups alone: one, and several. */
 const REFUSALS = /** @type {{[reason: string]: [string, string]}} */ ({
 	submitted: ['it is a submitted independent annotation', 'they are submitted independent annotations'],
+	undecided: ['its independent annotations differ, and nobody has decided yet', 'their independent annotations differ, and nobody has decided yet'],
 	unsolved: ['it is not solved yet', 'they are not solved yet'],
 	needs_note: ['it fails a gate, and accepting that needs a note', 'they fail a gate, and accepting that needs a note'],
 	unusable_ball: [

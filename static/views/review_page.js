@@ -27,6 +27,7 @@ import { ReviewHeader } from './review_header.js';
 import { REVIEW_KEYS } from './review_keys.js';
 import { Scene3D } from './scene3d/scene3d.js';
 import { BottomStrip } from './strip.js';
+import { UndecidedBar } from './undecided_bar.js';
 import { usePaint } from './view_paint.js';
 
 const ConflictBar = lazy(async () => (await import('./conflict_bar.js')).ConflictBar);
@@ -91,7 +92,7 @@ export function ReviewPage() {
 	return html`
 		<div class="review" ref=${root}>
 			<${ReviewHeader} />
-			<div class="bars">${isCopy(groupDocument.value) ? html`<${IndependentAnnotationBar} />` : null}<${NoticeBar} /><${LeaseBar} />${conflict.value ? html`<${ConflictBar} />` : null}</div>
+			<div class="bars">${isCopy(groupDocument.value) ? html`<${IndependentAnnotationBar} />` : null}<${NoticeBar} /><${LeaseBar} /><${UndecidedBar} />${conflict.value ? html`<${ConflictBar} />` : null}</div>
 			<${Workspace} />
 			${question.value ? html`<${ReturnDialog} />` : null}
 			${guidelinesShown.value ? html`<${Guidelines} />` : null}

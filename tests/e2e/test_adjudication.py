@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from playwright.sync_api import Page, expect
 
@@ -17,7 +18,10 @@ from tests.e2e.team import annotate
 from tests.e2e.test_access import serious_in_both
 
 
-def test_one_of_two_is_taken_by_keyboard(home: Path, open_page: Callable[..., Page]) -> None:
+def test_one_of_two_is_taken_by_keyboard(
+    home: Path, open_page: Callable[..., Page], console: Any
+) -> None:
+    console.expect("a status of 409")
     page = open_page("/datasets/sample/agreement")
     expect(page.get_by_text("Nothing to decide")).to_be_visible()
     group = passing(page, 1)
@@ -28,7 +32,15 @@ def test_one_of_two_is_taken_by_keyboard(home: Path, open_page: Callable[..., Pa
         assert annotate(store, group, "ada", 0) == "open"
     finally:
         store.close()
-    page.reload()
+    page.goto(f"/review/{group}")
+    expect(
+        page.get_by_role("status").filter(has_text="annotations of this group differ")
+    ).to_be_visible()
+    page.keyboard.press("a")
+    expect(page.get_by_role("alert")).to_contain_text("differ, and nobody has decided yet")
+    page.get_by_role("link", name="Open the decision").click()
+    expect(page.get_by_role("heading", name="Decide", exact=True)).to_be_visible()
+    page.goto("/datasets/sample/agreement")
     page.get_by_role("link", name="Decide the worst one").click()
     expect(page.locator(".compare__one")).to_have_count(2)
     expect(page.locator('.compare__panel .image-panel__stage[data-ready="true"]')).to_have_count(2)

@@ -131,6 +131,12 @@ def select_groups_in_agreement_state(state: str) -> Select[int]:
     return select(AgreementModel.group_id).where(AgreementModel.state == state)
 
 
+def list_undecided_groups(session: Session, dataset_id: int) -> set[int]:
+    """Ids of the groups of a dataset that wait for a decision in any batch."""
+    mine = AgreementModel.dataset_id == dataset_id
+    return set(session.scalars(select_groups_in_agreement_state(OPEN).where(mine)))
+
+
 def read_agreement_states(session: Session, group_ids: Sequence[int]) -> dict[int, str]:
     """What groups came to, what waits for a decision first; those that were not compared are left out."""
     rows = session.execute(

@@ -18,6 +18,7 @@ from app.db.log import NewLogEntry, append_entries
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError
+from app.features.agreement.queries import list_undecided_groups
 from app.features.independent_annotations.queries import list_closed_copies
 from app.features.people.visibility_queries import COPIES, sees_independent_work
 from app.features.queue.fields import query_reveals_hidden_work
@@ -45,11 +46,11 @@ from app.wording import plural
 CHUNK = 100
 """Groups a transaction: two or three hundredths of a second, for which others wait to write."""
 SAMPLE = 5
-SUBMITTED, UNSOLVED, NEEDS_NOTE, UNUSABLE_BALL, NO_PICTURE = (
-    "submitted", "unsolved", "needs_note", "unusable_ball", "no_picture",
+SUBMITTED, UNDECIDED, UNSOLVED, NEEDS_NOTE, UNUSABLE_BALL, NO_PICTURE = (
+    "submitted", "undecided", "unsolved", "needs_note", "unusable_ball", "no_picture",
 )  # fmt: skip
-"""Why a group is left alone: it is an independent annotation that was submitted, or its gates are
-not known to this solver, or it fails one, or its ball cannot be used, or no view of it has a
+"""Why a group is left alone: it is an independent annotation that was submitted, or its independent
+annotations differ and nobody has decided, or its gates are not known to this solver, or it fails one, or its ball cannot be used, or no view of it has a
 picture, and nobody says why it shall be accepted all the same."""
 
 
@@ -58,8 +59,8 @@ class RefusedGroups:
     """Groups that a bulk verdict leaves alone.
 
     Attributes:
-        reason: ``submitted`` (independent annotations that are closed), ``unsolved``, ``needs_note``
-            (they fail a gate), ``unusable_ball`` or ``no_picture``.
+        reason: ``submitted`` (independent annotations that are closed), ``undecided`` (their
+            independent annotations differ), ``unsolved``, ``needs_note`` (they fail a gate), ``unusable_ball`` or ``no_picture``.
     """
 
     reason: str
@@ -170,7 +171,8 @@ def give_verdicts(
 
     Accepting a group that fails a gate overrides the policy, as it does for one group alone:
     without a note such groups are refused and counted, and so are groups whose ball cannot be
-    used and groups without any picture. So are independent annotations that were submitted.
+    used and groups without any picture. So are independent annotations that were submitted, and
+    groups that wait for a decision between annotations that differ.
     A run that was stopped goes on with the groups behind its place that match then; what was
     imported since it began is not among them.
 
@@ -285,15 +287,19 @@ def select_groups_for_verdict(
     session: Session, dataset_id: int, rows: Sequence[Any], verdict: Verdict
 ) -> VerdictSelection:
     """The groups of a dataset that a verdict changes, and how many it is refused for, and why."""
-    reasons = (SUBMITTED, UNSOLVED, NEEDS_NOTE, UNUSABLE_BALL, NO_PICTURE)
+    reasons = (SUBMITTED, UNDECIDED, UNSOLVED, NEEDS_NOTE, UNUSABLE_BALL, NO_PICTURE)
     change, unchanged, refused = [], 0, dict.fromkeys(reasons, 0)
     closed = list_closed_copies(session, dataset_id) if dataset_id > COPIES else ()
+    judges = verdict.state != "unreviewed"
+    undecided = list_undecided_groups(session, dataset_id) if judges else ()
     unsolved = _unsolved_groups(session, dataset_id, rows) if verdict.state == "accepted" else ()
     for row in rows:
         if _has_verdict(row, verdict):
             unchanged += 1
         elif row.group_id in closed:
             refused[SUBMITTED] += 1
+        elif row.group_id in undecided:
+            refused[UNDECIDED] += 1
         elif row.group_id in unsolved:
             refused[UNSOLVED] += 1
         elif verdict.state == "accepted" and not row.passes and verdict.note is None:

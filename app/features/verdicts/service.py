@@ -7,7 +7,8 @@ from typing import get_args
 
 from app.db.session import Session, now
 from app.db.store import Store
-from app.errors import InputError
+from app.errors import ConflictError, InputError
+from app.features.agreement.queries import list_undecided_groups
 from app.features.groups.queries import StoredGroup
 from app.features.groups.state import GroupState, require_unchanged, require_unchanged_content
 from app.features.groups.submit import ensure_group_solution
@@ -56,7 +57,8 @@ def set_verdict(
         InputError: Unknown state or reason, or a note is missing.
         StaleRevisionError: The group is not what the person saw.
         ForbiddenError: It is somebody else's independent annotation.
-        ConflictError: It is an independent annotation that was submitted.
+        ConflictError: It is an independent annotation that was submitted, or the group waits for a
+            decision between annotations that differ.
     """
     verdict = check_verdict(state, reason, note)
     while True:
@@ -71,6 +73,7 @@ def set_verdict(
             require_unchanged_content(
                 session, group_id, record.content_part_of_etag, if_match, what
             )
+            _require_decided(session, stored, verdict)
             # Under another policy other gates may fail.
             if policy_hash == stored.policy.hash:
                 given = _make_verdict(session, stored, verdict, override, actor)
@@ -139,6 +142,17 @@ def _require_picture_to_accept(group: Group, verdict: Verdict) -> None:
             "was judged by",
             hint="Import it again with its frames, or say in the note why it is right.",
             pointer="/note",
+        )
+
+
+def _require_decided(session: Session, stored: StoredGroup, verdict: Verdict) -> None:
+    """Refuse a verdict that would pass over annotations that differ; withdrawing one is allowed."""
+    if verdict.state == "unreviewed":
+        return
+    if stored.id in list_undecided_groups(session, stored.dataset_id):
+        raise ConflictError(
+            "the independent annotations of this group differ, and nobody has decided yet",
+            hint=f"Decide between them first: /adjudicate/{stored.id}",
         )
 
 

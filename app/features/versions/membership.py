@@ -12,6 +12,7 @@ from app.db.json_columns import Json
 from app.db.session import Session
 from app.db.store import Store
 from app.errors import ConflictError
+from app.features.agreement.queries import list_undecided_groups
 from app.features.versions.diff import read_changelog
 from app.features.versions.queries import (
     CandidateRow,
@@ -27,6 +28,7 @@ from app.wording import plural
 
 RULES: tuple[str, ...] = get_args(VersionRule)
 UNSOLVED, UNUSABLE_BALL = "not solved", "unusable ball"
+UNDECIDED = "independent annotations differ"
 _DIGITS = re.compile(r"(\d+)")
 
 
@@ -69,8 +71,11 @@ def read_candidates(
         rule: One of ``RULES``.
         any_ball: Whether ``passing`` takes balls that cannot be used, too.
     """
-    rows = list_candidate_rows(session, dataset_id)
-    found = [_candidate_from_row(row, rule, any_ball) for row in rows]
+    undecided = list_undecided_groups(session, dataset_id)
+    found = [
+        _candidate_from_row(row, rule, any_ball, row.group_id in undecided)
+        for row in list_candidate_rows(session, dataset_id)
+    ]
     return sorted(found, key=lambda item: (item.match, natural_sort_key(item.key), item.key))
 
 
@@ -93,9 +98,9 @@ def require_solved(candidates: Sequence[Candidate], dataset: str) -> None:
         )
 
 
-def _candidate_from_row(row: CandidateRow, rule: str, any_ball: bool) -> Candidate:
+def _candidate_from_row(row: CandidateRow, rule: str, any_ball: bool, undecided: bool) -> Candidate:
     why = (
-        _why_excluded_by_accepted_rule(row)
+        _why_excluded_by_accepted_rule(row, undecided)
         if rule == "accepted"
         else _why_excluded_by_passing_rule(row, any_ball)
     )
@@ -122,11 +127,13 @@ def _verdict_to_json(row: CandidateRow) -> Json:
     }
 
 
-def _why_excluded_by_accepted_rule(row: CandidateRow) -> str | None:
+def _why_excluded_by_accepted_rule(row: CandidateRow, undecided: bool) -> str | None:
     if row.status != "accepted":
         return _why_rejected_or_deferred(row) or "unreviewed"
     if row.stale:
         return "changed after its verdict"
+    if undecided:
+        return UNDECIDED
     return _why_gates_fail(row)
 
 

@@ -25,7 +25,7 @@ from app.features.agreement.service import (
 from app.features.groups.edit import make_set_ball_edit
 from app.features.groups.history import ABOUT_COPIES, read_entry_changes, read_history
 from app.features.groups.state import GroupState
-from app.features.groups.submit import load_group_state, submit_edit
+from app.features.groups.submit import load_group_state, load_solved_group, submit_edit
 from app.features.imports.ingest import import_groups
 from app.features.independent_annotations.adopt import return_annotation
 from app.features.independent_annotations.queries import IndependentAnnotation
@@ -39,7 +39,9 @@ from app.features.people.roles import Role
 from app.features.people.service import invite
 from app.features.people.visibility_queries import READER, RestrictedReader
 from app.features.queue.service import list_groups
+from app.features.verdicts.bulk import RefusedGroups, give_verdicts, plan_verdicts
 from app.features.verdicts.service import set_verdict
+from app.features.versions.freeze import FreezeRequest, plan_freeze
 from tests.unit.features.independent_annotations.begun import begin_take
 
 
@@ -277,6 +279,59 @@ class TestDecide:
     def test_takes_nothing_that_does_not_wait_here(self, store, state, takes) -> None:
         with pytest.raises(NotFoundError, match="annotation 99"):
             adjudicate_case(store, state.id, 99, actor="lea")
+
+
+class TestVerdictMeanwhile:
+    """A group whose annotations differ gets no verdict but by the decision."""
+
+    @pytest.fixture
+    def takes(self, store, state) -> tuple[IndependentAnnotation, IndependentAnnotation]:
+        found = judged(store, state.id, "ann"), judged(store, state.id, "ben", 40.0)
+        assert compare_or_adopt_submission(store, found[1].copy_id) == "open"
+        return found
+
+    @pytest.mark.parametrize("who", ["ann", "ann (token x)", "lea"])
+    def test_is_refused_to_its_annotators_and_to_everybody_else(
+        self, store, state, takes, who
+    ) -> None:
+        with pytest.raises(ConflictError, match="annotations of this group differ") as refused:
+            set_verdict(store, state.id, "accepted", None, "x", if_match=state.etag, actor=who)
+        assert f"/adjudicate/{state.id}" in refused.value.hint
+        assert load_group_state(store, state.id).verdict.state == "unreviewed"
+
+    def test_is_left_out_of_a_bulk_verdict_counted_and_named(
+        self, store, state, takes, make_group
+    ) -> None:
+        import_groups(store, "demo", [make_group(8)], source="test", actor="ann")
+        asked = (store, state.dataset_id, "", "rejected", "other", "x")
+        plan = plan_verdicts(*asked)
+        assert (plan.matches, plan.would_change) == (2, 1)
+        done = give_verdicts(*asked, actor="ann")
+        for refused in (plan.refused, done.refused):
+            assert refused == (RefusedGroups("undecided", 1),)
+        assert (done.changed, len(list_open_cases(store, state.dataset))) == (1, 1)
+        assert load_group_state(store, state.id).verdict.state == "unreviewed"
+
+    def test_is_given_once_somebody_has_decided(self, store, state, takes) -> None:
+        etag = adjudicate_case(store, state.id, takes[1].id, as_start=True, actor="lea").etag
+        after = set_verdict(store, state.id, "accepted", None, "x", if_match=etag, actor="lea")
+        assert after.verdict.actor == "lea"
+
+    def test_of_before_is_withdrawn_and_enters_no_version(self, store, state, make_group) -> None:
+        import_groups(store, "demo", [make_group(8)], source="test", actor="ann")
+        accepted = [
+            set_verdict(store, one, "accepted", None, "x", if_match=etag, actor="lea")
+            for one in (state.id, state.id + 1)
+            for etag in [load_solved_group(store, one).etag]
+        ]
+        judged(store, state.id, "ann")
+        compare_or_adopt_submission(store, judged(store, state.id, "ben", 40.0).copy_id)
+        plan = plan_freeze(store, state.dataset, FreezeRequest())
+        assert plan.groups + sum(plan.left_out.values()) == 2
+        assert plan.left_out["independent annotations differ"] == 1
+        etag = accepted[0].etag
+        back = set_verdict(store, state.id, "unreviewed", None, None, if_match=etag, actor="lea")
+        assert back.verdict.state == "unreviewed"
 
 
 class TestHandBack:

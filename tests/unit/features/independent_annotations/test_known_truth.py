@@ -157,12 +157,12 @@ class TestVersion:
             judge(store, copy, person)
         assert compare_or_adopt_submission(store, copy) == "agreed"
         judge(store, 1, "ann")
+        judge(store, 3, "cy")
         for person, moved in (("ann", 0.0), ("bo", 40.0)):
             copy = begin_take(store, 3, person=person).copy_id
             drawn_as_it_is(store, copy, scenes[2], moved)
             judge(store, copy, person)
         assert compare_or_adopt_submission(store, copy) == "open"
-        judge(store, 3, "cy")
         freeze_dataset(store, "demo", FreezeRequest("v1"), actor="lea")
         key = load_group_state(store, 2).group.views[0].key
         ball = BallAnnotation(box=Box(10.0, 10.0, 14.0, 14.0))
