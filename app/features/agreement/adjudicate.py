@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from app.db.store import Store
@@ -16,6 +16,8 @@ from app.features.agreement.service import (
     list_undecided_annotations,
     read_limits,
 )
+from app.features.batches.queries import find_batch
+from app.features.batches.service import read_batch
 from app.features.datasets.service import dataset_id
 from app.features.groups.state import GroupState
 from app.features.groups.submit import load_solved_group
@@ -105,10 +107,16 @@ def read_case(store: Store, group_id: int, *, actor: str) -> AdjudicationCase:
             " been submitted"
         )
     states = [load_solved_group(store, annotation.copy_id) for annotation in annotations]
-    own = person_of_actor(actor) in {annotation.person for annotation in annotations}
+    name = person_of_actor(actor)
+    own = name in {annotation.person for annotation in annotations}
+    named = _list_named_reviewers(store, row.batch_id)
+    judges = _list_possible_judges(store, original.dataset_id, named)
+    others = [one for one in judges if one not in {made.person for made in annotations}]
     refused = None
-    if own and (others := _possible_judges(store, original.dataset_id, annotations)):
+    if own and others:
         refused = f"you annotated this group yourself; {_join_names(others)} can decide"
+    elif named and name not in judges:
+        refused = f"this batch has named reviewers; {_join_names(judges)} can decide"
     return AdjudicationCase(
         original,
         row.batch_id or None,
@@ -216,15 +224,20 @@ def return_for_correction(
     return return_annotation(store, annotation_id, reason, actor=actor)
 
 
-def _possible_judges(
-    store: Store, dataset: int, annotations: Sequence[IndependentAnnotation]
-) -> list[str]:
-    """The people who may judge in a dataset and made none of these annotations."""
-    takers = {annotation.person for annotation in annotations}
+def _list_named_reviewers(store: Store, batch_id: int) -> list[str]:
+    """The reviewers whom a batch (0: none) names; nobody where it was deleted."""
+    with store.read() as session:
+        there = find_batch(session, batch_id) is not None
+        return read_batch(session, batch_id, with_here=False).reviewers if there else []
+
+
+def _list_possible_judges(store: Store, dataset: int, named: Collection[str]) -> list[str]:
+    """The people who may judge in a dataset; where reviewers are named, these and the leads."""
     return [
         one.name
         for one in list_members(store, dataset)
-        if role_allows(one.role, Action.REVIEW) and one.name not in takers
+        if role_allows(one.role, Action.REVIEW)
+        and (not named or one.name in named or role_allows(one.role, Action.LEAD))
     ]
 
 

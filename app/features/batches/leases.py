@@ -54,7 +54,7 @@ class BatchMember:
 
     Attributes:
         name: As in the log.
-        may_annotate, may_review: What their role allows in the dataset.
+        may_annotate, may_review, leads: What their role allows in the dataset.
         alone: Nobody has an account here: they are everybody.
     """
 
@@ -62,6 +62,7 @@ class BatchMember:
     may_annotate: bool = True
     may_review: bool = True
     alone: bool = False
+    leads: bool = False
 
     def roles_in_batch(self, batch: Batch) -> set[BatchRole]:
         """The roles of the person in a batch."""
@@ -210,8 +211,8 @@ class LeaseService:
 
         Raises:
             NotFoundError: There is no such batch, or it has no such group.
-            ConflictError: They are not one of its annotators, somebody else has submitted it, or the
-                batch is closed.
+            ConflictError: They are not one of its annotators, somebody else has submitted it, it has a
+                verdict, or the batch is closed.
         """
         with self._store.read() as session:
             batch = _read_open_batch(session, batch_id)
@@ -228,11 +229,14 @@ class LeaseService:
             row = _require_batch_group(session, batch, group)
             if BatchRole.ANNOTATOR not in worker.roles_in_batch(batch):
                 raise ConflictError(f'you are not an annotator of the batch "{batch.name}"')
-            others = row.submitted is not None and row.submitted_by != worker.name
-            if row.settled is not None or others:
-                by = row.submitted_by or "somebody"
+            if row.settled is not None:
                 raise ConflictError(
-                    f"{by} has submitted this group", hint="Continue with the next group."
+                    "this group already has a verdict", hint="Continue with the next group."
+                )
+            if row.submitted is not None and row.submitted_by != worker.name:
+                raise ConflictError(
+                    f"{row.submitted_by} has submitted this group",
+                    hint="Continue with the next group.",
                 )
             set_group_submission(
                 session,
@@ -253,7 +257,8 @@ class LeaseService:
 
         Raises:
             NotFoundError: There is no such batch, or it has no such group.
-            ConflictError: It is not submitted, its work is over, or the batch is closed.
+            ConflictError: They neither review the batch nor lead, it is not submitted, its work is
+                over, or the batch is closed.
             InputError: The sentence is too long.
         """
         checked = strip_and_check_reason(reason)
@@ -261,6 +266,11 @@ class LeaseService:
             batch = _read_open_batch(session, batch_id)
             _require_group_access(session, batch, group)
             row = _require_batch_group(session, batch, group)
+            if not worker.leads and BatchRole.REVIEWER not in worker.roles_in_batch(batch):
+                raise ConflictError(
+                    f'you are not a reviewer of the batch "{batch.name}"',
+                    hint="A reviewer of the batch or a lead can return the group.",
+                )
             if row.settled is not None:
                 raise ConflictError(
                     "this group already has a verdict", hint="Undo the verdict first."

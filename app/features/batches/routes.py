@@ -239,8 +239,10 @@ class BatchMemberResolver:
         if self.login is None:
             return BatchMember(LOCAL_USER, alone=True)
         role = self.login.roles.find_role_in(dataset_id)
-        annotates, reviews = (role_allows(role, one) for one in (Action.ANNOTATE, Action.REVIEW))
-        return BatchMember(self.login.name, annotates, reviews)
+        annotates, reviews, leads = (
+            role_allows(role, one) for one in (Action.ANNOTATE, Action.REVIEW, Action.LEAD)
+        )
+        return BatchMember(self.login.name, annotates, reviews, leads=leads)
 
     def member_of_batch(self, store: Store, batch: int) -> BatchMember:
         """Them, in the dataset of a batch."""

@@ -7,11 +7,13 @@ from dataclasses import replace
 import pytest
 
 from app.db.store import Store
+from app.errors import ForbiddenError
 from app.features.agreement.adjudicate import (
     adjudicate_case,
     adopt_into_group,
     list_open_cases,
     read_case,
+    return_for_correction,
 )
 from app.features.agreement.service import compare_or_adopt_submission
 from app.features.batches.leases import BatchMember, LeaseService
@@ -100,6 +102,26 @@ def test_one_that_a_lead_applies_early_ends_the_work_on_its_group(store, batch) 
     assert compare_or_adopt_submission(store, annotate(store, leases, batch, "bo", 1.0)) == "agreed"
     assert get_batch(store, batch.id).settled == 2
     assert leases.lease_next_group(batch.id, BatchMember("ada")).group is None
+
+
+def test_the_named_reviewers_of_a_batch_and_leads_decide_and_nobody_else(store, batch) -> None:
+    leases = LeaseService(store)
+    for name, role in (("dan", Role.REVIEWER), ("lea", Role.LEAD)):
+        invite(store, name, role, actor="local")
+    for person, moved in (("ada", 1.0), ("bo", 30.0)):
+        copy = annotate(store, leases, batch, person, moved)
+        compare_or_adopt_submission(store, copy)
+    (case,) = list_open_cases(store, batch.dataset_id)
+    found = read_case(store, case.group, actor="dan")
+    assert found.refused == "this batch has named reviewers; cy or lea can decide"
+    one = found.annotations[0].id
+    for decide in (adjudicate_case, return_for_correction):
+        with pytest.raises(ForbiddenError, match="cy or lea can decide"):
+            decide(store, case.group, one, actor="dan")
+    refused = [read_case(store, case.group, actor=name).refused for name in ("ada", "cy", "lea")]
+    assert refused == ["you annotated this group yourself; cy or lea can decide", None, None]
+    change_batch(store, batch.id, actor="lea", reviewers=[])
+    assert read_case(store, case.group, actor="dan").refused is None
 
 
 def test_the_people_of_a_batch_are_told_of_it_once(store, batch) -> None:
