@@ -28,6 +28,7 @@ from app.features.independent_annotations.queries import (
     IndependentAnnotation,
     insert_gold,
     is_copy_dataset,
+    list_abandoned_annotations,
     list_annotations_of_batch,
     list_gold_without_copy,
 )
@@ -251,8 +252,8 @@ def begin_next_annotation(
 ) -> IndependentAnnotation | None:
     """The independent annotation that a person shall work on now: the one that is open, else a new one.
 
-    New are groups that they have no annotation of and that fewer than ``verdicts`` people have, in the
-    batch's order; where gold groups are mixed in by chance, lest an order that is known tells which
+    New are groups that they have no annotation of and that fewer than ``verdicts`` people have (who
+    began one and left does not count), in the batch's order; where gold groups are mixed in by chance, lest an order that is known tells which
     ones they are; or a gold group that they never had. Two who ask at once get what they would have
     got one after the other.
 
@@ -283,8 +284,11 @@ def _resume_or_begin_annotation(
     if waiting is not None:
         return waiting
     # A group that waits again has an annotation that is settled: somebody else gets it.
+    abandoned = list_abandoned_annotations(session, terms.batch_id)
     begun = Counter(
-        row.group_id for row in annotations if row.kind == INDEPENDENT and row.settled is None
+        row.group_id
+        for row in annotations
+        if row.kind == INDEPENDENT and row.settled is None and row.id not in abandoned
     )
     had = {annotation.group_id for annotation in mine}
     free = [one for one in terms.groups if one not in had and begun[one] < terms.verdicts]

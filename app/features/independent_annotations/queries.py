@@ -6,13 +6,25 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, get_args
 
-from sqlalchemy import Select, bindparam, delete, exists, func, insert, or_, select, update
+from sqlalchemy import (
+    ColumnElement,
+    Exists,
+    Select,
+    bindparam,
+    delete,
+    exists,
+    func,
+    insert,
+    or_,
+    select,
+    update,
+)
 from sqlalchemy.orm import aliased
 
 from app.db.dialects.dialect import insert as insert_or_update
 from app.db.json_columns import Json, compress_json, decompress_json
 from app.db.session import Session, now
-from app.features.batches.tables import BatchGroupModel
+from app.features.batches.tables import BatchGroupModel, BatchPersonModel
 from app.features.datasets.tables import DatasetModel, GroupModel
 from app.features.groups.insert_queries import find_next_row_id
 from app.features.independent_annotations.tables import (
@@ -20,6 +32,7 @@ from app.features.independent_annotations.tables import (
     GoldModel,
     IndependentAnnotationModel,
 )
+from app.features.people.tables import PersonModel
 from app.features.queue.tables import QueueModel
 from app.soccer.choices import GoldStart
 
@@ -183,12 +196,36 @@ def list_annotations_of_batch(
     return _fetch_annotations(session, statement.order_by(IndependentAnnotationModel.id))
 
 
+def is_abandoned() -> ColumnElement[bool]:
+    """Whether an annotation of a batch was begun, not submitted, and its person works on the batch no
+    more: they are disabled, or the batch was given to others. It leaves its place to somebody else."""
+    annotation, part, person = IndependentAnnotationModel, BatchPersonModel, aliased(PersonModel)
+    here, own = part.batch_id == annotation.batch_id, part.person_id == person.id
+
+    def is_given(*where: ColumnElement[bool]) -> Exists:
+        return exists().where(here, *where).correlate(annotation, person)
+
+    annotates = is_given(own, part.part == "annotator") | (
+        ~is_given(part.part == "annotator") & (is_given(own) | ~is_given())
+    )
+    left = person.disabled.is_(True) | ~annotates
+    gone = exists().where(person.name == annotation.person, left).correlate(annotation)
+    return annotation.submitted.is_(None) & gone
+
+
+def list_abandoned_annotations(session: Session, batch_id: int) -> set[int]:
+    """Ids of the annotations of a batch that were begun by people who work on it no more."""
+    mine = IndependentAnnotationModel.batch_id == batch_id
+    return set(session.scalars(select(IndependentAnnotationModel.id).where(mine, is_abandoned())))
+
+
 def count_begun_and_free_groups(
     session: Session, batch_id: int, dataset_id: int, person: str, verdicts: int
 ) -> tuple[int, int]:
     """How many independent annotations of a batch a person has begun, and of how many of its groups they may make one.
 
-    ``verdicts`` people may have a group; whose annotation is settled do not count where it waits again.
+    ``verdicts`` people may have a group; whose annotation is settled do not count where it waits again,
+    nor do those who began one and left.
     """
     annotation, group = IndependentAnnotationModel, BatchGroupModel
     here = (annotation.batch_id == batch_id, annotation.copy_id.in_(_select_copy_ids(dataset_id)))
@@ -196,7 +233,13 @@ def count_begun_and_free_groups(
     ends = (annotation.submitted.is_(None), annotation.settled.is_(None))
     begun_by_others = (
         select(func.count())
-        .where(*here, this, annotation.kind == INDEPENDENT, annotation.settled.is_(None))
+        .where(
+            *here,
+            this,
+            annotation.kind == INDEPENDENT,
+            annotation.settled.is_(None),
+            ~is_abandoned(),
+        )
         .scalar_subquery()
     )
     free = select(func.count()).where(

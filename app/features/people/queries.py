@@ -29,7 +29,7 @@ from app.db.session import Session, now
 from app.features.batches.queries import OPEN
 from app.features.batches.tables import BatchGroupModel, BatchModel, BatchPersonModel
 from app.features.datasets.tables import DatasetModel
-from app.features.independent_annotations.queries import GOLD, INDEPENDENT
+from app.features.independent_annotations.queries import GOLD, INDEPENDENT, is_abandoned
 from app.features.independent_annotations.tables import CopyDatasetModel, IndependentAnnotationModel
 from app.features.people.tables import (
     DatasetRoleModel,
@@ -235,7 +235,10 @@ def _blind_batches_column() -> ColumnElement[Any]:
         _build_correlated_exists(*named) & ~annotators
     )
     own_count = select(func.count()).where(
-        here, annotation.group_id == group.group_id, annotation.kind == INDEPENDENT
+        here,
+        annotation.group_id == group.group_id,
+        annotation.kind == INDEPENDENT,
+        ~is_abandoned(),
     )
     free = _build_correlated_exists(
         group.batch_id == batch.id,
