@@ -12,6 +12,7 @@ from app.db.store import Store
 from app.features.batches.leases import BatchMember, LeaseService
 from app.features.batches.service import NewBatch, make_batch
 from app.features.people.roles import Role
+from app.features.people.service import change_person, find_person
 from tests.e2e.screen import TWO_FRAMES, Screen, hears, holding, until
 from tests.e2e.team import (
     REFUSED,
@@ -204,6 +205,38 @@ class TestWork:
         expect(lotte.locator('.compare__one[data-chosen="true"]')).to_contain_text("ulf")
         lotte.keyboard.press("Enter")
         until(lotte, lambda: verdict(lotte, 9) == {"state": "rejected", "by": "lotte"})
+
+    def test_a_batch_is_reassigned_beside_people_who_left(
+        self, open_page: OpenPage, team: str, team_home: Path, console: Any
+    ) -> None:
+        console.expect(REFUSED)
+        join(team_home, "lida", Role.LEAD)
+        for name in ("gone", "less", "next"):
+            join(team_home, name, Role.ANNOTATOR)
+        new = NewBatch("Leavers", "id:4", annotators=["gone", "less"], skip_given=False)
+
+        def leave(store: Store) -> int:
+            batch = make_batch(store, "sample", new, actor="local").id
+            change_person(store, find_person(store, "gone").id, disabled=True, actor="local")
+            change_person(store, find_person(store, "less").id, role=Role.VIEWER, actor="local")
+            return batch
+
+        batch = in_store(team_home, leave)
+        page = open_page("/work", address=team)
+        log_in(page, "lida")
+        page.get_by_role("button", name="Reassign… Leavers").click()
+        dialog = page.get_by_role("dialog", name="Reassign: Leavers")
+        annotators = dialog.get_by_role("group", name="Annotators")
+        expect(annotators.get_by_label("gone (disabled)")).to_be_checked()
+        less = annotators.get_by_label("less (no longer an annotator)")
+        expect(less).to_be_checked()
+        less.uncheck()
+        expect(less).not_to_be_checked()
+        annotators.get_by_label("next").check()
+        dialog.get_by_role("button", name="Save").click()
+        expect(dialog).to_be_hidden()
+        found = page.request.get(f"/api/v1/batches/{batch}").json()
+        assert found["annotators"] == ["gone", "next"]
 
     def test_a_lead_hands_one_of_two_annotations_back_and_takes_the_other_over(
         self, open_page: OpenPage, team: str, team_home: Path, console: Any

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
 from enum import StrEnum
@@ -297,11 +297,11 @@ def change_batch(
 ) -> Batch:
     """Give a batch on to others, close or open it, or name it otherwise; None leaves as it is.
 
-    ``gold_every`` counts from the next group on that somebody begins, ``no_gold``: none is one.
+    Who has a part already keeps it, also where they could not get it any more. ``gold_every`` counts from the next group on that somebody begins, ``no_gold``: none is one.
 
     Raises:
         NotFoundError: There is none.
-        InputError: Somebody named may not do that part, or gold groups would be too rare.
+        InputError: Somebody newly named may not do that part, or gold groups would be too rare.
         ConflictError: The dataset has no gold group to mix in.
     """
     _check_gold_interval(gold_every)
@@ -316,8 +316,16 @@ def change_batch(
     if gold_every is not None or no_gold:
         values["gold_every"] = gold_every
     named = {BatchRole.ANNOTATOR: annotators, BatchRole.REVIEWER: reviewers}
+    with store.read() as session:
+        there = list_batch_people(session, [batch_id])
     people = {
-        part: _person_ids(store, before.dataset_id, part, names)
+        part: _person_ids(
+            store,
+            before.dataset_id,
+            part,
+            names,
+            {one.name: one.id for one in there if one.part == part},
+        )
         for part, names in named.items()
         if names is not None
     }
@@ -398,17 +406,27 @@ def _build_batches(
     return found
 
 
-def _person_ids(store: Store, dataset: int, part: BatchRole, names: Iterable[str]) -> list[int]:
-    """Ids of people who may do a part in a dataset."""
+def _person_ids(
+    store: Store,
+    dataset: int,
+    part: BatchRole,
+    names: Iterable[str],
+    kept: Mapping[str, int] | None = None,
+) -> list[int]:
+    """Ids of people who may do a part in a dataset; ``kept``, by name, are not asked whether they may."""
     wanted = {name.strip().lower() for name in names}
     if not wanted:
         return []
-    able = {
-        one.name: one.id
-        for one in list_members(store, dataset)
-        if role_allows(one.role, _NEEDS[part])
-    }
+    members = list_members(store, dataset)
+    able = {one.name: one.id for one in members if role_allows(one.role, _NEEDS[part])}
+    able |= kept or {}
     missing = sorted(wanted - set(able))
+    if missing and missing[0] not in {one.name for one in members}:
+        raise InputError(
+            f"{missing[0]} is disabled or has no account",
+            hint="Enable or invite them first, or choose another person.",
+            pointer=f"/{part}s",
+        )
     if missing:
         raise InputError(
             f"{missing[0]} does not have the role {part} in this dataset",

@@ -34,9 +34,9 @@ from app.features.independent_annotations.queries import (
     find_annotation_of_copy,
 )
 from app.features.notifications.queries import select_notifications
-from app.features.people.queries import find_person_by_name
+from app.features.people.queries import find_person_by_name, find_rights
 from app.features.people.roles import Role
-from app.features.people.service import invite
+from app.features.people.service import change_person, find_person, invite
 from app.features.people.visibility_queries import EVERYTHING
 from app.features.queue.service import list_groups
 from app.features.verdicts.service import set_verdict
@@ -151,6 +151,25 @@ class TestBatch:
             get_batch(store, batch.id)
         with store.read() as session:
             replay_log(session)
+
+    @pytest.mark.parametrize("left", [{"disabled": True}, {"role": Role.VIEWER}])
+    def test_is_reassigned_beside_a_person_who_left_and_to_nobody_who_left(
+        self, store, dataset, left
+    ):
+        new = NewBatch("a", annotators=["ada", "bo"], reviewers=["bo"])
+        batch = make_batch(store, dataset, new, actor="lead").id
+        for name in ("ada", "bo"):
+            change_person(store, find_person(store, name).id, actor="lead", **left)
+        given = change_batch(
+            store, batch, actor="lead", annotators=["ada", "bo", "cy"], reviewers=["bo"]
+        )
+        assert (given.annotators, given.reviewers) == (["ada", "bo", "cy"], ["bo"])
+        given = change_batch(store, batch, actor="lead", annotators=["cy"])
+        assert given.annotators == ["cy"]
+        why = "is disabled or has no account" if "disabled" in left else "does not have the role"
+        for part, name in (("annotators", "ada"), ("reviewers", "ada")):
+            with pytest.raises(InputError, match=f"{name} {why}"):
+                change_batch(store, batch, actor="lead", **{part: [name]})
 
 
 class TestGoldGroups:
@@ -490,6 +509,25 @@ class TestLeases:
         with pytest.raises(ConflictError, match="already has a verdict"):
             leases.return_group(batch, groups[0], BO, "once more", actor="bo")
 
+    def test_it_says_that_it_has_a_verdict_to_who_submits_it_too_late(
+        self, store, dataset, groups, leases
+    ):
+        batch = make_batch(store, dataset, NewBatch("a", annotators=["ada"]), actor="lead").id
+        judge(store, groups[0], "bo")
+        with pytest.raises(ConflictError, match="this group already has a verdict"):
+            leases.submit_group(batch, groups[0], ADA, actor="ada")
+
+    def test_the_named_reviewers_and_leads_return_a_group_and_nobody_else(
+        self, store, dataset, groups, leases
+    ):
+        new = NewBatch("a", annotators=["ada"], reviewers=["bo"])
+        batch = make_batch(store, dataset, new, actor="lead").id
+        for member in (BO, BatchMember("lea", leads=True)):
+            leases.submit_group(batch, groups[0], ADA, actor="ada")
+            with pytest.raises(ConflictError, match='not a reviewer of the batch "a"'):
+                leases.return_group(batch, groups[0], CY, "the ball", actor="cy")
+            leases.return_group(batch, groups[0], member, "the ball", actor=member.name)
+
 
 class TestOwnPlace:
     """A copy is in no queue: its place is among those of its person."""
@@ -517,6 +555,48 @@ class TestOwnPlace:
         batch = make_batch(store, dataset, NewBatch("a", annotators=["ada"]), actor="lead").id
         lease = LeaseService(store).lease_next_group(batch, ADA)
         assert (lease.place, lease.of) == (None, None)
+
+
+class TestWhoLeft:
+    """A copy that somebody began and left keeps nobody else from the group."""
+
+    @pytest.mark.parametrize("disabled", [True, False])
+    def test_its_place_is_somebody_elses(self, store, dataset, groups, leases, disabled):
+        people = ["ada", "bo", "cy"]
+        new = NewBatch("a", size=1, annotators=people, verdicts=2)
+        batch = make_batch(store, dataset, new, actor="lead").id
+        for member in (ADA, BO):
+            assert leases.lease_next_group(batch, member).group is not None
+        assert leases.lease_next_group(batch, CY).group is None
+        assert self.waits_for_cy(store, batch) == (0, False)
+        if disabled:
+            ada = find_person(store, "ada").id
+            change_person(store, ada, disabled=True, actor="lead")
+        else:
+            change_batch(store, batch, actor="lead", annotators=people[1:])
+        assert self.waits_for_cy(store, batch) == (1, True)
+        copy = leases.lease_next_group(batch, CY).group
+        assert copy is not None
+        for member, mine in ((BO, leases.lease_next_group(batch, BO).group), (CY, copy)):
+            leases.submit_group(batch, mine, member, actor=member.name)
+        assert compare_or_adopt_submission(store, copy) == "agreed"
+        assert get_batch(store, batch).settled == 1
+
+    def test_what_they_submitted_counts(self, store, dataset, groups, leases):
+        new = NewBatch("a", size=1, annotators=["ada", "cy"], verdicts=1, gold_every=2)
+        make_gold(store, groups[5])
+        batch = make_batch(store, dataset, new, actor="lead").id
+        assert originals(store, leases, batch, ADA) == [groups[0]]
+        change_person(store, find_person(store, "ada").id, disabled=True, actor="lead")
+        assert originals(store, leases, batch, CY) == []
+
+    def waits_for_cy(self, store, batch) -> tuple[int, bool]:
+        """How many groups are left for cy, and whether their session is told that some are."""
+        (mine,) = [one for one in list_own_batches(store, lambda _: CY) if one.batch.id == batch]
+        with store.read() as session:
+            cy = find_person_by_name(session, "cy").id
+            ((_, _, waits),) = find_rights(session, cy, ["lead"]).blind
+        return mine.left, waits
 
 
 class TestProgress:
