@@ -66,6 +66,7 @@ function verdictWords({ state, reason, note, override }) {
 /** What became of somebody's own annotation. @param {string} kind @param {any} body */
 function ownWords(kind, { did, person, reason, of = [] }) {
 	if (did === 'handed back') return `Returned to ${person}${reason ? `: “${reason}”` : ''}`;
+	if (did === 'reopened') return `The decision for ${person}’s annotation was undone: the group waits for a decision again`;
 	if (kind === 'take') return `Applied ${person}’s independent annotation`;
 	return did === 'agreed' ? `${of.join(' and ')} agree: ${person}’s annotation is used` : `Chose ${person}’s annotation`;
 }

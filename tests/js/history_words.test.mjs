@@ -29,6 +29,7 @@ describe('sentenceOfEntry', () => {
 		assert.equal(said('take', { did: 'adopted', take: 1, person: 'anna' }), 'Applied anna’s independent annotation');
 		assert.equal(said('agreement', { did: 'agreed', person: 'anna', of: ['anna', 'bo'] }), 'anna and bo agree: anna’s annotation is used');
 		assert.equal(said('work', { did: 'handed back', person: 'bo', reason: 'the far line' }), 'Returned to bo: “the far line”');
+		assert.equal(said('agreement', { did: 'reopened', person: 'bo' }), 'The decision for bo’s annotation was undone: the group waits for a decision again');
 		assert.equal(said('agreement', { did: 'decided', person: 'bo', of: ['anna', 'bo'] }), 'Chose bo’s annotation');
 	});
 	it('says nothing of the words of a comment', () => {

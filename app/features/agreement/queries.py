@@ -174,6 +174,12 @@ def complete_unchosen_annotations(session: Session, take_ids: Sequence[int], at:
     session.execute(update(IndependentAnnotationModel).where(*rest).values(settled=at))
 
 
+def reopen_annotations(session: Session, take_ids: Sequence[int]) -> None:
+    """Takes that were decided about wait for a decision again."""
+    mine = IndependentAnnotationModel.id.in_(take_ids)
+    session.execute(update(IndependentAnnotationModel).where(mine).values(settled=None))
+
+
 def list_groups_to_compare(session: Session) -> list[tuple[int, int | None]]:
     """Group and batch (None: none) of annotations that several people submitted and nobody compared."""
     annotation, row = IndependentAnnotationModel, AgreementModel

@@ -377,6 +377,7 @@ def _find_work_sentence(row: AuditRow, body: Mapping[str, Any]) -> str | None:
         ("work", "taken back"): f"reopened group {group} of batch {body.get('batch')}",
         ("agreement", "agreed"): f"annotations agree, {person}’s is used",
         ("agreement", "decided"): f"chose {person}’s annotation",
+        ("agreement", "reopened"): f"undid the decision for {person}’s annotation",
         ("agreement", "limits"): "set the limits of agreement",
         ("gold", "marked"): f"marked group {group} as gold",
         (

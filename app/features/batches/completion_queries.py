@@ -107,6 +107,12 @@ def complete_group_in_batch(
     _announce_finished_batches(session, near, actor=actor, at=at)
 
 
+def reopen_group_in_batch(session: Session, batch_id: int, group_id: int) -> None:
+    """The work on a group of a batch goes on."""
+    mine = (BatchGroupModel.batch_id == batch_id, BatchGroupModel.group_id == group_id)
+    session.execute(update(BatchGroupModel).where(*mine).values(settled=None))
+
+
 def _announce_finished_batches(
     session: Session, batch_ids: Collection[int], *, actor: str, at: str
 ) -> None:

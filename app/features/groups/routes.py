@@ -9,6 +9,7 @@ from pydantic import Field
 
 from app.db.store import Store
 from app.errors import NotFoundError
+from app.features.agreement.reopen import undo_edit_or_decision
 from app.features.datasets.service import dataset_id
 from app.features.groups import submit
 from app.features.groups.history import (
@@ -29,7 +30,7 @@ from app.features.groups.schemas import (
 )
 from app.features.groups.solution_schemas import SolutionDocument
 from app.features.groups.state import GroupState
-from app.features.groups.undo import redo_group_edit, undo_group_edit
+from app.features.groups.undo import redo_group_edit
 from app.features.people.roles import role_allows
 from app.features.queue import service as queue
 from app.features.queue.routes import (
@@ -269,10 +270,15 @@ async def preview_group(
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @respond_with(make_group_response)
 def undo_group(group: Id, services: AppServices, actor: Actor, if_match: IfMatch) -> GroupState:
-    """Take the last edit back; 409 when there is none."""
+    """Take the last edit back; 409 when there is none.
+
+    Where a decision between independent annotations made it, the group waits for a decision again.
+    """
     store = services.store
     with add_current_state_to_conflicts(lambda: load_group_document(store, group)):
-        return undo_group_edit(store, group, if_match=if_match, actor=actor, paint=services.paint)
+        return undo_edit_or_decision(
+            store, group, if_match=if_match, actor=actor, paint=services.paint
+        )
 
 
 @router.post(

@@ -15,13 +15,16 @@ from app.features.agreement.adjudicate import (
     read_case,
     return_for_correction,
 )
+from app.features.agreement.reopen import undo_edit_or_decision
 from app.features.agreement.service import compare_or_adopt_submission
 from app.features.batches.leases import BatchMember, LeaseService
 from app.features.batches.progress import list_own_batches
 from app.features.batches.service import Batch, NewBatch, change_batch, get_batch, make_batch
 from app.features.groups.edit import make_set_ball_edit
+from app.features.groups.history import read_history
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.independent_annotations.service import get_annotation_of_copy
+from app.features.integrity.checks import examine_database
 from app.features.notifications.queries import select_notifications
 from app.features.people.queries import find_person_by_name
 from app.features.people.roles import Role
@@ -122,6 +125,42 @@ def test_the_named_reviewers_of_a_batch_and_leads_decide_and_nobody_else(store, 
     assert refused == ["you annotated this group yourself; cy or lea can decide", None, None]
     change_batch(store, batch.id, actor="lea", reviewers=[])
     assert read_case(store, case.group, actor="dan").refused is None
+
+
+@pytest.mark.parametrize("as_start", [False, True])
+def test_a_decision_whose_edit_is_undone_is_made_again(store, batch, as_start) -> None:
+    leases = LeaseService(store)
+    for person, moved in (("ada", 1.0), ("bo", 30.0)):
+        copy = annotate(store, leases, batch, person, moved)
+        compare_or_adopt_submission(store, copy)
+    (case,) = list_open_cases(store, batch.dataset_id)
+    before = read_case(store, case.group, actor="cy")
+    one = before.annotations[1]
+    for _ in range(2):
+        done = adjudicate_case(store, case.group, one.id, as_start=as_start, actor="cy")
+        assert get_batch(store, batch.id).settled == 1
+        undone = undo_edit_or_decision(store, case.group, if_match=done.etag, actor="dan")
+        assert undone.group == before.original.group
+        assert read_case(store, case.group, actor="cy").annotations == before.annotations
+        assert get_batch(store, batch.id).settled == 0
+    told = [entry.body for entry in read_history(store, case.group) if entry.kind == "agreement"]
+    assert [body["did"] for body in told] == ["decided", "reopened"] * 2
+    assert [str(check) for check in examine_database(store) if not check.ok] == []
+
+
+def test_an_edit_after_the_decision_is_undone_without_reopening_it(store, batch) -> None:
+    leases = LeaseService(store)
+    for person, moved in (("ada", 1.0), ("bo", 30.0)):
+        copy = annotate(store, leases, batch, person, moved)
+        compare_or_adopt_submission(store, copy)
+    (case,) = list_open_cases(store, batch.dataset_id)
+    one = read_case(store, case.group, actor="cy").annotations[1].id
+    done = adjudicate_case(store, case.group, one, actor="cy")
+    view = next(view for view in done.group.views if view.ball is not None)
+    edit = make_set_ball_edit(view.key, None)
+    edited = submit_edit(store, case.group, edit, if_match=done.etag, actor="cy")
+    undo_edit_or_decision(store, case.group, if_match=edited.etag, actor="cy")
+    assert list_open_cases(store, batch.dataset_id) == []
 
 
 def test_the_people_of_a_batch_are_told_of_it_once(store, batch) -> None:
