@@ -34,7 +34,7 @@ from app.features.comments.queries import StoredThread as StoredThread
 from app.features.notifications.queries import NotificationKind
 from app.features.notifications.service import notify_person
 from app.features.people.logins import read_roles
-from app.features.people.queries import MemberRow, find_person_by_name, read_members
+from app.features.people.queries import find_person_by_name, read_members
 from app.features.people.roles import Role
 from app.soccer.actors import is_actor_of, person_of_actor
 
@@ -80,7 +80,9 @@ def list_mentionable_people(store: Store, group_id: int) -> list[str]:
     with store.read() as session:
         group = _require_group(session, group_id)
         return [
-            row.name for row in read_members(session, group.dataset_id) if _can_read_dataset(row)
+            row.name
+            for row in read_members(session, group.dataset_id)
+            if _can_read_dataset(session, row.id, row.everywhere, group.dataset_id)
         ]
 
 
@@ -261,16 +263,17 @@ def _find_reader_ids(
     found: dict[str, int] = {}
     for name in names:
         row = find_person_by_name(session, name)
-        if row is not None and not row.disabled:
-            roles = read_roles(session, row.id, Role(row.role))
-            if roles.find_role_in(group.dataset_id) is not Role.NONE:
-                found[name] = row.id
+        if row is None or row.disabled:
+            continue
+        if _can_read_dataset(session, row.id, row.role, group.dataset_id):
+            found[name] = row.id
     return found
 
 
-def _can_read_dataset(row: MemberRow) -> bool:
-    here = row.everywhere if row.role is None or row.everywhere == Role.ADMIN else row.role
-    return bool(here != Role.NONE)
+def _can_read_dataset(session: Session, person_id: int, everywhere: str, dataset_id: int) -> bool:
+    """Whether a person sees a dataset; one of copies only its person and the leads do."""
+    roles = read_roles(session, person_id, Role(everywhere))
+    return roles.find_role_in(dataset_id) is not Role.NONE
 
 
 def _log_comment(

@@ -20,6 +20,7 @@ from app.features.people.roles import Role
 from app.features.people.service import change_person, give_role, invite
 from app.features.queue.changes import read_changes
 from app.features.queue.service import list_groups
+from tests.unit.features.independent_annotations.begun import begin_take
 
 
 @pytest.fixture
@@ -171,6 +172,15 @@ class TestMentions:
         give_role(store, "demo", carl, Role.VIEWER, actor="local")
         assert comments.list_mentionable_people(store, group) == ["anna", "bob", "carl"]
         assert told(store, "carl") == []
+
+    def test_of_a_copy_its_person_and_the_leads_alone_are_offered_and_told(
+        self, store: Store, group: int
+    ) -> None:
+        invite(store, "lea", Role.LEAD, actor="local")
+        copy = begin_take(store, group, person="bob").copy_id
+        assert comments.list_mentionable_people(store, copy) == ["bob", "lea"]
+        thread = comments.begin_thread(store, copy, "@anna @carl @lea", actor="bob")
+        assert thread.comments[0].mentions == ("lea",)
 
     def test_who_spoke_before_hears_of_a_reply_and_who_is_named_once(
         self, store: Store, group: int
