@@ -19,6 +19,7 @@ from app.features.groups.state import (
 from app.features.verdicts.bulk import save_verdicts
 from app.features.verdicts.queries import StoredVerdict, find_next_verdict_id, read_verdicts
 from app.features.verdicts.service import Verdict, set_verdict
+from app.soccer.actors import person_of_actor
 
 
 def undo_verdict(
@@ -37,7 +38,7 @@ def undo_verdict(
         actor: Who gave the verdict, and takes it back.
 
     Raises:
-        ConflictError: The newest verdict is another one.
+        ConflictError: The newest verdict is another one, or another person's.
         StaleRevisionError: The group is not what the person saw.
         ForbiddenError: It is somebody else's independent annotation.
     """
@@ -45,6 +46,12 @@ def undo_verdict(
         record = read_group_without_solution(session, group_id)
         verdicts = read_verdicts(session, [group_id]).get(group_id, [])
         newest = next(iter(verdicts), None)
+        others = newest is not None and person_of_actor(newest.actor) != person_of_actor(actor)
+        if newest is not None and others and _is_of_time(newest, given):
+            raise ConflictError(
+                "another person gave this verdict, so only they can undo it",
+                hint="Give another verdict if the present one is wrong.",
+            )
         if newest is None or not _is_verdict_of(newest, given, actor):
             raise ConflictError(
                 "the newest verdict on this group is not the one to undo, so it stays",
@@ -114,7 +121,11 @@ def _require_unchanged_since(
 
 
 def _is_verdict_of(verdict: StoredVerdict, given: datetime, actor: str) -> bool:
-    return verdict.actor == actor and datetime.fromisoformat(verdict.at) == given
+    return verdict.actor == actor and _is_of_time(verdict, given)
+
+
+def _is_of_time(verdict: StoredVerdict, given: datetime) -> bool:
+    return datetime.fromisoformat(verdict.at) == given
 
 
 def make_restoring_verdicts(

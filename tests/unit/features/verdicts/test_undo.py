@@ -92,7 +92,7 @@ class TestUndoVerdict:
 
     def test_nobody_undoes_the_verdict_of_a_colleague(self, store, state) -> None:
         theirs = judge(store, state, "deferred", actor="ann")
-        with pytest.raises(ConflictError, match="is not the one to undo"):
+        with pytest.raises(ConflictError, match="another person gave this verdict"):
             undo(store, theirs, theirs)
 
     def test_a_group_that_was_edited_meanwhile_is_looked_at_first(self, store, state) -> None:
