@@ -39,7 +39,7 @@ export function DeleteDataset({ one, onClose }) {
 					title=${meant ? '' : 'Type the name of the dataset first'}
 				>${busy ? 'Deleting…' : 'Delete for good'}</button>`}
 		>
-			<p><strong>${one.name}</strong> is deleted with every edit, verdict, frozen version, prediction and evaluation. Frames on disk stay. This cannot be undone.</p>
+			<p><strong>${one.name}</strong> is deleted with every edit, verdict, batch, independent annotation, frozen version, prediction and evaluation. Frames on disk stay. This cannot be undone.</p>
 			${counts.length ? html`<dl class="number-list">${counts.map(([name, n]) => html`<div key=${name}><dt>${words(name)}</dt><dd>${count(n)}</dd></div>`)}</dl>` : null}
 			<div class="form__row">
 				<label for="delete-name">Type <strong>${one.name}</strong> to confirm</label>

@@ -92,6 +92,8 @@ _COUNTED = {
     "views": "view",
     "verdicts": "verdict",
     "saved_views": "saved_view",
+    "batches": "batch",
+    "annotations": "take",
     "recordings": "recording",
     "tracks": "track",
     "versions": "version",

@@ -113,7 +113,8 @@ class DeletionResultDocument(BaseModel):
     id: int
     name: str
     counts: dict[str, int] = Field(
-        description="groups, views, verdicts, saved_views, versions, predictions, evaluations."
+        description="groups, views, verdicts, saved_views, batches, annotations (independent ones, also"
+        " those not submitted yet), recordings, tracks, versions, predictions, evaluations."
     )
 
 

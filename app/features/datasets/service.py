@@ -402,6 +402,8 @@ def delete_dataset(
     _delete_solutions(store, identity)
     with store.write() as session:
         contents = _read_contents_in_session(session, identity)
+        # They went with the copies.
+        contents.counts["annotations"] += found.counts["annotations"]
         removal.reserve_used_ids(session)
         heir = None if afresh is None else removal.move_access_to_next_dataset(session, identity)
         body = {"name": contents.name, "counts": contents.counts, "heir": heir}

@@ -9,6 +9,7 @@ from app.db.dialects.dialect import get_session_dialect
 from app.db.log import LogModel, verify_chain
 from app.db.store import Store
 from app.errors import ConflictError, NotFoundError, StorageError
+from app.features.batches.service import NewBatch, make_batch
 from app.features.datasets import service as module
 from app.features.datasets.service import delete_dataset, get_dataset, list_datasets, read_contents
 from app.features.groups.edit import make_set_ball_edit
@@ -17,6 +18,7 @@ from app.features.groups.replay import rebuild_tables, replay_log
 from app.features.groups.state_snapshot_queries import read_state_snapshot
 from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import UnassignedFrame, import_groups, import_unassigned_frames
+from app.features.independent_annotations.service import submit_annotation
 from app.features.people.access_tokens import AccessTokens
 from app.features.people.logins import Login, LoginSessions, read_roles
 from app.features.people.roles import DatasetRoles, Role, Scope
@@ -32,6 +34,7 @@ from app.features.what_if.service import WhatIfStore
 from app.soccer.annotation import BallAnnotation, Extras
 from app.soccer.frames import Box
 from app.soccer.policy import PAPER
+from tests.unit.features.independent_annotations.begun import begin_take
 
 
 @pytest.fixture
@@ -80,6 +83,16 @@ class TestReadContents:
         assert contents.counts["groups"] == contents.counts["verdicts"] == 3
         assert contents.counts["views"] == 7
         assert contents.counts["saved_views"] == 1
+
+    def test_counts_work_in_progress_and_reports_it_when_it_is_deleted(self, two: Store) -> None:
+        make_batch(two, "demo", NewBatch("open"), actor="lead")
+        group = list_groups(two, 1).items[0].id
+        submit_annotation(two, begin_take(two, group, person="ann").id, actor="ann")
+        begin_take(two, group, person="ben")
+        asked = read_contents(two, "demo")
+        gone = delete_dataset(two, "demo", confirm="demo", actor="eve")
+        for contents in (asked, gone):
+            assert [contents.counts[name] for name in ("batches", "annotations")] == [1, 2]
 
     def test_an_unknown_dataset_is_not_found(self, store) -> None:
         with pytest.raises(NotFoundError):
