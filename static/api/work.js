@@ -9,7 +9,7 @@ import { request } from './client.js';
 /** @typedef {'annotator' | 'reviewer'} Part */
 /** @typedef {{id: number, dataset: string, name: string, kind: 'groups' | 'tracks', q: string, sort: string, verdicts: number, due: string | null, state: 'open' | 'closed', created: string, created_by: string, annotators: string[], reviewers: string[], groups: number, waiting: number, submitted: number, settled: number, last: string | null}} BatchJson */
 /** @typedef {{batch: BatchJson, group: number | null, part: Part | null, until: string | null, here: Presence[], submitted_by: string | null, returned: ReturnedJson | null, place: number | null, of: number | null}} LeaseJson */
-/** @typedef {{batch: BatchJson, parts: Part[], left: number, returned: ReturnedJson[]}} MyBatchJson */
+/** @typedef {{batch: BatchJson, parts: Part[], left: number, returned: ReturnedJson[], hides_groups: boolean}} MyBatchJson */
 /** @typedef {{name: string, submitted: number, judged: number, groups: number, minutes: number, minutes_a_group: number | null, groups_an_hour: number | null}} PaceJson */
 /** @typedef {{batch: BatchJson, gold_every: number | null, here: Presence[], stalled: string | null, people: PaceJson[]}} TeamBatchJson */
 /** @typedef {{name: string, q: string, size: number | null, annotators: string[], reviewers: string[], due: string | null, skip_given: boolean, verdicts?: number, blind?: boolean, gold_every?: number | null, tracks?: number[]}} NewBatch */

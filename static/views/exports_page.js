@@ -15,7 +15,7 @@ import { isOver } from '../state/jobs.js';
 import { ConfirmButton } from './confirm_button.js';
 import { ExportDialog } from './export_dialog.js';
 import { FormError } from './form_error.js';
-import { Loading, PageFrame, Trouble } from './page_frame.js';
+import { Empty, Loading, PageFrame, Trouble } from './page_frame.js';
 import { sizeText } from './source_choice.js';
 import { When } from './when.js';
 
@@ -78,7 +78,7 @@ export function ExportsPage() {
 			${exports.error ? html`<${Trouble} title="The exports cannot be shown" error=${exports.error} retry=${exports.reload} />` : null}
 			${!exports.value && !exports.error ? html`<${Loading} what="exports" />` : null}
 			${error ? html`<${FormError} error=${error} card=${true} />` : null}
-			${exports.value && items.length === 0 ? html`<section class="card empty"><h2>No export yet</h2><p>An export is a zip file of a dataset in a format of your choice. Its manifest lists the contents, the policy and the digest of each file.</p></section>` : null}
+			${exports.value && items.length === 0 ? html`<${Empty} what="exports" title="No export yet"><p>An export is a zip file of a dataset in a format of your choice. Its manifest lists the contents, the policy and the digest of each file.</p><//>` : null}
 			${items.length ? html`
 				<section class="card card--flush" aria-label="Exports">
 					<table class="table">

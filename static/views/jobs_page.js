@@ -12,7 +12,7 @@ import { isOver } from '../state/jobs.js';
 import { pageAddress } from './dataset_menu.js';
 import { JobProgress, toneOf } from './job_progress.js';
 import { mayImport } from './no_datasets.js';
-import { Loading, PageFrame, Trouble } from './page_frame.js';
+import { Empty, Loading, PageFrame, Trouble } from './page_frame.js';
 import { When } from './when.js';
 
 /** @import {JobJson} from '../api/jobs.js' */
@@ -112,7 +112,7 @@ export function JobsPage() {
 		<${PageFrame} current="jobs" title="Jobs" where=${html`<strong>Jobs</strong>`}>
 			${error ? html`<${Trouble} title="The jobs cannot be shown" error=${error} retry=${retry} />` : null}
 			${!jobs && !error ? html`<${Loading} what="jobs" />` : null}
-			${jobs?.length === 0 ? html`<section class="card empty"><h2>No jobs yet</h2><p>Imports, solving, freezing, exports and evaluations show up here.</p>${mayImport() ? html`<p><a class="button" href="/import">Import a dataset</a></p>` : null}</section>` : null}
+			${jobs?.length === 0 ? html`<${Empty} what="jobs" title="No jobs yet"><p>Imports, solving, freezing, exports and evaluations show up here.</p>${mayImport() ? html`<p><a class="button" href="/import">Import a dataset</a></p>` : null}<//>` : null}
 			${open.length ? html`<${JobList} title="Under way" jobs=${open} />` : null}
 			${over.length ? html`<${JobList} title="Finished" jobs=${over} />` : null}
 			${next ? html`<p><button class="button" type="button" onClick=${more}>Older jobs</button></p>` : null}

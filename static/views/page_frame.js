@@ -55,6 +55,21 @@ export function Loading({ what }) {
 	return html`<p class="page__loading" role="status">Reading ${what}…</p>`;
 }
 
+/**
+ * The card of a list without an item: of what the person sees, where more is hidden from them; else what `children` says.
+ *
+ * @param {{what: string, title: string, children?: ComponentChildren}} props `what`: "jobs"
+ */
+export function Empty({ what, title, children }) {
+	const hiding = (datasets.value ?? []).filter((one) => one.hides_groups).map(({ name }) => name);
+	return html`
+		<section class="card empty">
+			<h2>${hiding.length ? `No ${what} to show` : title}</h2>
+			${hiding.length ? html`<p data-hidden-groups>The ${what} of ${hiding.join(' and ')} are hidden from you until the batch that you annotate independently is closed.</p>` : children}
+		</section>
+	`;
+}
+
 /** @param {{title: string, error: Error, retry?: () => void}} props */
 export function Trouble({ title, error, retry }) {
 	return html`

@@ -390,12 +390,10 @@ class TestReviewers:
         seen = ask("anna", "GET", f"/batches/{plain}").json()
         assert (seen["groups"], seen["waiting"]) == (1, 1)
         assert ask("lea", "GET", f"/batches/{plain}").json()["groups"] == 3
-        (left,) = [
-            one["left"]
-            for one in ask("anna", "GET", "/work").json()["items"]
-            if one["batch"]["id"] == plain
-        ]
-        assert left == 1
+        work = {one["batch"]["id"]: one for one in ask("anna", "GET", "/work").json()["items"]}
+        assert work[plain]["left"] == 1
+        # She annotates copies of the one, and the groups themselves of the other.
+        assert [work[batch]["hides_groups"] for batch in (blind, plain)] == [True, False]
         # Nor are the originals opened by the batch whose copies she annotates.
         for target in ("submission", "lease"):
             at = f"/batches/{blind}/groups/{made.ordinary[3]}/{target}"

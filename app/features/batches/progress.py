@@ -35,7 +35,7 @@ from app.features.independent_annotations.queries import (
     list_open_annotations,
 )
 from app.features.independent_annotations.service import ReturnedGroup, read_returned_groups
-from app.features.people.visibility_queries import EVERYTHING, Visibility
+from app.features.people.visibility_queries import EVERYTHING, Visibility, hides_batch_groups
 from app.features.webhooks.queries import (
     STALLED,
     list_active_webhooks,
@@ -135,12 +135,14 @@ PAUSE = timedelta(minutes=10)
 @dataclass(frozen=True)
 class MyBatch:
     """A batch of somebody's: ``left`` groups wait for them or for others beside them, and
-    ``returned`` are those that they had submitted and have back."""
+    ``returned`` are those that they had submitted and have back. ``hides_groups``: they annotate copies
+    of its groups, which are hidden from them."""
 
     batch: Batch
     parts: list[BatchRole]
     left: int
     returned: list[ReturnedGroup] = field(default_factory=list)
+    hides_groups: bool = False
 
 
 @dataclass(frozen=True)
@@ -204,7 +206,13 @@ def list_own_batches(
                 back = _list_returned_groups(session, batch, worker.name)
                 seen = with_own_counts(session, batch, worker.name) if own else batch
                 found.append(
-                    MyBatch(hide_others_progress(session, seen), sorted(parts), left, back)
+                    MyBatch(
+                        hide_others_progress(session, seen),
+                        sorted(parts),
+                        left,
+                        back,
+                        hides_batch_groups(batch.dataset_id, batch.id),
+                    )
                 )
         return found
 

@@ -188,6 +188,9 @@ class MyBatchDocument(Document):
     returned: list[ReturnedGroup] = Field(
         description="Submitted groups that were returned to the person, in the order of the batch."
     )
+    hides_groups: bool = Field(
+        description="The person annotates copies of its groups, and the groups are hidden from them."
+    )
 
 
 class MyWork(ListDocument[MyBatchDocument]):

@@ -71,6 +71,12 @@ def has_hidden_groups(dataset_id: int) -> bool:
     return reader is not None and dataset_id in reader.batches
 
 
+def hides_batch_groups(dataset_id: int, batch_id: int) -> bool:
+    """Whether whoever asks annotates copies of a batch of a dataset, and does not see its groups."""
+    reader = READER.get()
+    return reader is not None and batch_id in reader.batches.get(dataset_id, ())
+
+
 def hides_groups_from_reader() -> bool:
     """Whether groups of any dataset are hidden from whoever asks.
 

@@ -17,7 +17,7 @@ import { addVideos, videoUploads } from '../../state/video_uploads.js';
 import { ConfirmButton } from '../confirm_button.js';
 import { FormError } from '../form_error.js';
 import { JobProgress } from '../job_progress.js';
-import { Loading, PageFrame, Trouble } from '../page_frame.js';
+import { Empty, Loading, PageFrame, Trouble } from '../page_frame.js';
 import { useEnded, useRunningJobs } from '../running_jobs.js';
 import { SourceChoice } from '../source_choice.js';
 import { When } from '../when.js';
@@ -106,7 +106,7 @@ export function RecordingsPage() {
 			${found.error ? html`<${Trouble} title="The recordings cannot be shown" error=${found.error} retry=${found.reload} />` : null}
 			${!found.value && !found.error ? html`<${Loading} what="recordings" />` : null}
 			${error ? html`<${FormError} error=${error} card=${true} />` : null}
-			${found.value && items.length === 0 ? html`<section class="card empty"><h2>No recording yet</h2><p>A recording is a video of a match. Touchline finds its shots; you choose instants, and each becomes a group to review. The file stays where it is.</p><p>No video at hand? The <a class="link" href="/help/practice">practice</a> has a recording to learn on, and <code>touchline sample-recording film.mp4</code> creates a made-up video of three minutes.</p></section>` : null}
+			${found.value && items.length === 0 ? html`<${Empty} what="recordings" title="No recording yet"><p>A recording is a video of a match. Touchline finds its shots; you choose instants, and each becomes a group to review. The file stays where it is.</p><p>No video at hand? The <a class="link" href="/help/practice">practice</a> has a recording to learn on, and <code>touchline sample-recording film.mp4</code> creates a made-up video of three minutes.</p><//>` : null}
 			${items.length ? html`
 				<section class="card card--flush" aria-label="Recordings">
 					<div class="table__scroll" tabindex="0" role="region" aria-label="Table of recordings">

@@ -10,7 +10,7 @@ import { useAttempt } from '../../lib/attempt.js';
 import { plural } from '../../lib/format.js';
 import { useResource } from '../../lib/resource.js';
 import { navigate } from '../../lib/router.js';
-import { dataset, datasets, loadDatasets } from '../../state/datasets.js';
+import { dataset, loadDatasets } from '../../state/datasets.js';
 import { goOn } from '../../state/leases.js';
 import { isTeam } from '../../state/me.js';
 import { reviewAddress } from '../../state/navigation.js';
@@ -33,10 +33,9 @@ async function openTrack({ id, dataset: name }) {
 }
 
 /** @param {{one: MyBatchJson, first: boolean}} props `first`: Enter goes on with it */
-function MyBatch({ one: { batch, parts, left, returned: back }, first }) {
+function MyBatch({ one: { batch, parts, left, returned: back, hides_groups: hides }, first }) {
 	const button = useRef(/** @type {HTMLButtonElement | null} */ (null));
 	const { error, attempt } = useAttempt();
-	const hides = datasets.value?.find(({ name }) => name === batch.dataset)?.hides_groups ?? false;
 	// Who is at something else already stays there; where another one becomes the first, nobody is taken to it.
 	useEffect(() => { if (first && document.activeElement === document.body) button.current?.focus(); }, []);
 	const tracks = batch.kind === 'tracks';
@@ -50,7 +49,7 @@ function MyBatch({ one: { batch, parts, left, returned: back }, first }) {
 					<h3>${batch.name}</h3>
 					<${Progress} batch=${batch} />
 					<p class="note">${batch.dataset} · you ${parts.map((part) => (part === 'annotator' ? 'annotate' : 'review')).join(' and ')}${batch.verdicts > 1 && parts.includes('reviewer') ? html` · <a class="link" href=${pageAddress(batch.dataset, 'agreement')}>decide where annotations differ</a>` : null}<${Due} due=${batch.due} /></p>
-					${hides && parts.includes('annotator') ? html`<p class="note" data-hidden-groups>You annotate copies of the groups. The groups themselves are hidden from you until this batch is closed.</p>` : null}
+					${hides ? html`<p class="note" data-hidden-groups>You annotate copies of the groups. The groups themselves are hidden from you until this batch is closed.</p>` : null}
 					${back.length ? html`<ul class="work__back" aria-label="Returned to you">${back.map((one) => html`
 						<li key=${one.group}><a href=${reviewAddress(one.group, `batch:${batch.id}`)}>${one.title}</a> was returned by ${one.by}${one.reason ? html`: “${one.reason}”` : ''} <small><${When} at=${one.at} /></small></li>`)}</ul>` : null}
 					${error ? html`<${FormError} error=${error} />` : null}
