@@ -422,6 +422,24 @@ class TestReviewers:
         for batch in (blind, plain):
             assert ask("lea", "PATCH", f"/batches/{batch}", {"state": "closed"}).status_code == 200
 
+    def test_a_token_for_one_dataset_is_given_no_copy(self, made: Gold) -> None:
+        ask = made.team.ask
+        batch = give_out(made.team, "anna", made.ordinary[3:5])
+        new = {"name": "near", "scopes": ["annotate"], "dataset": "demo"}
+        token = ask("anna", "POST", "/tokens", new).json()["text"]
+        copy = ask("anna", "POST", f"/batches/{batch}/next", {}).json()["group"]
+        for method, target, body in (
+            ("POST", f"/batches/{batch}/next", {}),
+            ("PUT", f"/batches/{batch}/groups/{copy}/lease", {}),
+            ("PUT", f"/batches/{batch}/groups/{copy}/submission", None),
+            ("POST", f"/groups/{made.others[0]}/independent-annotations", None),
+        ):
+            answer = ask("anna", method, target, body, Authorization=f"Bearer {token}", Cookie="")
+            assert answer.status_code == 403, (target, answer.text)
+            assert "does not reach independent annotations" in answer.json()["detail"]
+        closed = ask("lea", "PATCH", f"/batches/{batch}", {"state": "closed"})
+        assert closed.status_code == 200
+
     def test_a_closed_batch_hides_nothing(self, made: Gold) -> None:
         ask, groups = made.team.ask, made.ordinary[2:3]
         batch = give_out(made.team, "anna", groups)

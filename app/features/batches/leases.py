@@ -37,7 +37,11 @@ from app.features.batches.queries import (
 from app.features.batches.service import WORK, Batch, BatchRole, Presence, read_batch
 from app.features.independent_annotations.adopt import log_and_notify_return, strip_and_check_reason
 from app.features.independent_annotations.queries import IndependentAnnotation
-from app.features.independent_annotations.service import ReturnedGroup, read_returned_groups
+from app.features.independent_annotations.service import (
+    ReturnedGroup,
+    read_returned_groups,
+    require_reach,
+)
 from app.features.people.visibility_queries import (
     READER,
     has_hidden_groups,
@@ -56,6 +60,7 @@ class BatchMember:
         name: As in the log.
         may_annotate, may_review, leads: What their role allows in the dataset.
         alone: Nobody has an account here: they are everybody.
+        reaches_copies: Whether they may open copies: a token for one dataset may not.
     """
 
     name: str
@@ -63,6 +68,7 @@ class BatchMember:
     may_review: bool = True
     alone: bool = False
     leads: bool = False
+    reaches_copies: bool = True
 
     def roles_in_batch(self, batch: Batch) -> set[BatchRole]:
         """The roles of the person in a batch."""
@@ -126,11 +132,13 @@ class LeaseService:
         Raises:
             NotFoundError: There is no such batch.
             ConflictError: It is given to others, or closed.
+            ForbiddenError: They would get a copy, which their token does not reach.
         """
         with self._store.write(lasting=False) as session:
             batch = _read_open_batch(session, batch_id)
             if not makes_own_annotations(batch, worker.roles_in_batch(batch)):
                 return self._lease_next_shared_group(session, batch, worker, after)
+            require_reach(worker.reaches_copies)
             back = list_returned_groups(session, batch, worker.name)
             mine = next((group for group in back if group != after), None)
             if mine is not None:
@@ -167,12 +175,14 @@ class LeaseService:
         Raises:
             NotFoundError: There is no such batch, or it has no such group.
             HeldGroupError: Somebody else has the group open.
+            ForbiddenError: It is a copy, which their token does not reach; so does ``submit_group``.
             ConflictError: The batch is closed or given to others.
         """
         with self._store.write(lasting=False) as session:
             batch = _read_open_batch(session, batch_id)
             own = find_own_annotation(session, batch, group, worker.name)
             if own is not None:
+                require_reach(worker.reaches_copies)
                 return _make_lease_of_copy(session, batch, own, worker)
             _require_group_access(session, batch, group)
             parts, row = (
@@ -218,6 +228,7 @@ class LeaseService:
             batch = _read_open_batch(session, batch_id)
             own = find_own_annotation(session, batch, group, worker.name)
         if own is not None:
+            require_reach(worker.reaches_copies)
             lease = Lease(batch, group)
             with self._store.write() as session:
                 submit_own_annotation(session, own, actor=actor, done=done)

@@ -245,7 +245,13 @@ class BatchMemberResolver:
         annotates, reviews, leads = (
             role_allows(role, one) for one in (Action.ANNOTATE, Action.REVIEW, Action.LEAD)
         )
-        return BatchMember(self.login.name, annotates, reviews, leads=leads)
+        return BatchMember(
+            self.login.name,
+            annotates,
+            reviews,
+            leads=leads,
+            reaches_copies=not self.login.roles.limited,
+        )
 
     def member_of_batch(self, store: Store, batch: int) -> BatchMember:
         """Them, in the dataset of a batch."""

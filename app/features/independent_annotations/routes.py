@@ -192,9 +192,11 @@ def _begun_response(annotation: DisclosedAnnotation) -> Response:
 @may(Action.ANNOTATE, group=OwnedKind.GROUP)
 @respond_with(_begun_response)
 def begin_independent_annotation(
-    group: Id, store: AppStore, actor: Actor
+    group: Id, store: AppStore, actor: Actor, request: Request
 ) -> service.DisclosedAnnotation:
     """Begin an own annotation of a group, on a copy that nobody else sees; the one begun, if so."""
+    login = get_current_login(request.scope)
+    service.require_reach(login is None or not login.roles.limited)
     return service.begin_annotation(store, group, person=actor)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from app.db.log import iterate_group_entries_of_kinds
 from app.db.session import Session, now
 from app.db.store import Store
-from app.errors import ConflictError, NotFoundError
+from app.errors import ConflictError, ForbiddenError, NotFoundError
 from app.features.datasets.service import require_dataset_id
 from app.features.groups.queries import read_groups
 from app.features.groups.state import require_group
@@ -113,6 +113,15 @@ class DisclosedAnnotation:
     verdict: str | None
     settled: Moment | None
     returned: ReturnedGroup | None = None
+
+
+def require_reach(reaches_copies: bool) -> None:
+    """Raise ForbiddenError where whoever asks does not reach copies: by a token for one dataset."""
+    if not reaches_copies:
+        raise ForbiddenError(
+            "a token for one dataset does not reach independent annotations",
+            hint="Use a token for all datasets.",
+        )
 
 
 def begin_annotation(store: Store, group_id: int, *, person: str) -> DisclosedAnnotation:
