@@ -104,6 +104,32 @@ def _shows_another_match(old: Group, new: Group) -> bool:
     )
 
 
+def shows_another_picture(old: Group, new: Group) -> bool:
+    """Whether a view of two groups of the same key has another picture, where that is known."""
+    return any(
+        _is_same_picture(view, other) is False
+        for view in old.views
+        if (other := new.view(view.key)) is not None
+    )
+
+
+def shows_another_scene(old: Group, new: Group) -> bool:
+    """Whether two groups of the same key are of different scenes: neither a picture nor what is annotated
+    is the same. Pictures of which nothing is known tell nothing, other than a match or a split does."""
+    pairs = [(view, other) for view in old.views if (other := new.view(view.key)) is not None]
+    said = [(_list_annotations(view), _list_annotations(other)) for view, other in pairs]
+    if any(old == new and any(old) for old, new in said):
+        return False
+    same = {_is_same_picture(view, other) for view, other in pairs}
+    return True not in same and (False in same or _shows_another_match(old, new))
+
+
+def _list_annotations(view: View) -> list[object]:
+    """What tells one picture of a camera from another: of a static camera the balls alone."""
+    own = [] if view.station.shared else [view.station.lines, view.station.given]
+    return [view.balls, *own]
+
+
 def _is_same_picture(old: View, new: View) -> bool | None:
     if old.media is None or new.media is None:
         return None

@@ -36,6 +36,8 @@ from app.features.groups.reimport import (
     KIND,
     KeptEditFinding,
     SharedStations,
+    shows_another_picture,
+    shows_another_scene,
     update_group_from_dataset,
 )
 from app.features.groups.revision_queries import save_reimported_group
@@ -56,6 +58,8 @@ from app.features.pitches.queries import is_pitch_edited, read_edited_pitches
 from app.features.pitches.service import set_pitch_of_groups
 from app.features.policies.service import choose_first_policy
 from app.features.queue.refresh_queries import refresh_queue
+from app.features.verdicts.bulk import save_verdicts
+from app.features.verdicts.queries import find_next_verdict_id, read_verdicts
 from app.formats.frame_names import compose_name
 from app.formats.issia import FramePersons
 from app.formats.report import ReaderReport
@@ -85,6 +89,7 @@ class IngestReport:
         left_out: Takes what was left out, with the reason.
         dropped_views: Views that left groups of which others came, by the group's key.
         replaced: Groups that changed and came from another source before, by that source.
+        withdrawn: Verdicts that were withdrawn, as their groups show other pictures now.
     """
 
     new: int = 0
@@ -97,6 +102,7 @@ class IngestReport:
     left_out: ReaderReport = field(default_factory=ReaderReport, compare=False)
     dropped_views: dict[str, int] = field(default_factory=dict)
     replaced: Counter[str] = field(default_factory=Counter)
+    withdrawn: int = 0
 
     def describe_replaced_parts(self, source: str) -> list[str]:
         """A sentence for each part of earlier imports that was replaced."""
@@ -112,6 +118,12 @@ class IngestReport:
             sentences.append(
                 f"{plural(count, 'group')} came from {before} before and now {have} other pictures or "
                 f"annotations from {source}"
+            )
+        if self.withdrawn:
+            was = "was" if self.withdrawn == 1 else "were"
+            sentences.append(
+                f"{plural(self.withdrawn, 'verdict')} {was} withdrawn, because the picture that was judged "
+                "has been replaced by another"
             )
         return sentences
 
@@ -336,7 +348,6 @@ def import_group_chunk(
     gone = filter_groups_with_finding(session, [item.id for item in known.values()], GONE)
     fresh: list[tuple[Group, str]] = []
     changed: list[tuple[int, Group, str]] = []
-    replaced: list[int] = []
     for group in batch:
         digest, there = hash_imported_group(group), known.get(group.key)
         if there is None:
@@ -345,22 +356,19 @@ def import_group_chunk(
             report.unchanged += 1
         else:
             changed.append((there.id, group, digest))
-            if there.source_hash != digest:
-                replaced.append(there.id)
-    report.replaced.update(_find_other_sources(session, origin, replaced))
+    before = _find_sources(session, [identity for identity, _, _ in changed])
     for identity, group, digest in changed:
-        _update_group(session, origin, identity, group, digest, shared.ids, report)
+        _update_group(
+            session, origin, identity, group, digest, shared.ids, report, before.get(identity)
+        )
     insert_new_groups(session, origin, fresh, shared.ids)
     report.new += len(fresh)
 
 
-def _find_other_sources(
-    session: Session, origin: ImportContext, group_ids: Sequence[int]
-) -> list[str]:
-    """The sources that last brought groups, but for this one, once for each group."""
+def _find_sources(session: Session, group_ids: Sequence[int]) -> dict[int | None, str]:
+    """The sources that last brought groups, by the group's id."""
     entries = find_newest_imports(session, group_ids) if group_ids else []
-    sources = (str(entry.body["source"]) for entry in entries)
-    return [source for source in sources if source != origin.source]
+    return {entry.group_id: str(entry.body["source"]) for entry in entries}
 
 
 def insert_new_groups(
@@ -402,8 +410,19 @@ def _update_group(
     digest: str,
     shared: dict[str, int],
     report: IngestReport,
+    before: str | None,
 ) -> None:
     stored, at = read_groups(session, [group_id])[group_id], now()
+    is_replaced = before not in (None, origin.source) and stored.source_hash != digest
+    if is_replaced and shows_another_scene(stored.group, incoming):
+        report.left_out.add_problem_at(
+            origin.source,
+            incoming.key,
+            None,
+            f"is also the name of another group, which came from {before}; this one is left out: "
+            "import it into another dataset, or give its pictures other names",
+        )
+        return
     followed = update_group_from_dataset(stored, incoming)
     if (count := len(followed.group.views)) > MAX_VIEWS:
         report.left_out.add_problem_at(
@@ -439,8 +458,46 @@ def _update_group(
         session, [NewLogEntry("import", origin.actor, at, body, origin.dataset_id, group_id)]
     )
     refresh_queue(session, [group_id])
+    _withdraw_verdict_on_other_picture(session, origin, stored, after, report)
     report.changed += 1
     report.findings += len(followed.kept)
+    if is_replaced:
+        report.replaced[str(before)] += 1
+
+
+def _withdraw_verdict_on_other_picture(
+    session: Session,
+    origin: ImportContext,
+    stored: StoredGroup,
+    after: StoredGroup,
+    report: IngestReport,
+) -> None:
+    """Withdraw a verdict that its group would keep though a picture of it is another one.
+
+    A verdict on other annotations is stale by itself; the pictures are no part of what is solved.
+    """
+    verdict = next(iter(read_verdicts(session, [stored.id]).get(stored.id, ())), None)
+    if (
+        verdict is None
+        or verdict.state == "unreviewed"
+        or verdict.inputs_hash != after.inputs_hash
+        or not shows_another_picture(stored.group, after.group)
+    ):
+        return
+    at = now()
+    withdrawn = replace(
+        verdict,
+        id=find_next_verdict_id(session),
+        actor=origin.actor,
+        at=at,
+        state="unreviewed",
+        reason=None,
+        note="the import brought another picture",
+        override=None,
+        fixed=False,
+    )
+    save_verdicts(session, stored.dataset_id, [withdrawn], actor=origin.actor, at=at)
+    report.withdrawn += 1
 
 
 def _find_edited_pitch(session: Session, stored: StoredGroup, incoming: Group) -> Pitch | None:

@@ -22,6 +22,7 @@ from app.features.groups.submit import load_group_state, submit_edit
 from app.features.imports.ingest import IngestReport, import_groups
 from app.features.imports.sources import ImportSource, import_source
 from app.features.queue.service import list_groups
+from app.features.verdicts.service import set_verdict
 from app.soccer.annotation import BallAnnotation
 from app.soccer.frames import Box
 from app.soccer.group import Group, Media
@@ -49,7 +50,8 @@ def zipped(path: Path, members: Mapping[str, object]) -> Path:
 
 
 def bring(store: Store, path: Path, form: str = "frames", *, dry_run: bool = False) -> IngestReport:
-    source = ImportSource(form, path)
+    """Import, under the name of the file alone, as uploads are."""
+    source = ImportSource(form, path, name=path.name)
     return import_source(store, "cup", source, store.settings, dry_run=dry_run).result
 
 
@@ -116,11 +118,11 @@ class TestOtherPictures:
         self, store: Store, tmp_path: Path
     ) -> None:
         for folder, end in (("a", b"\x01"), ("b", b"\x02")):
-            (tmp_path / folder).mkdir()
-            (tmp_path / folder / "0001.jpg").write_bytes(RED + end)
-        bring(store, tmp_path / "a")
+            (tmp_path / folder / "pics").mkdir(parents=True)
+            (tmp_path / folder / "pics" / "0001.jpg").write_bytes(RED + end)
+        bring(store, tmp_path / "a" / "pics")
         before = draw_ball(store).group
-        assert bring(store, tmp_path / "b").findings == 1
+        assert bring(store, tmp_path / "b" / "pics").findings == 1
         assert first_group(store).group == before
 
 
@@ -148,9 +150,9 @@ class TestOtherFrames:
         assert (report.findings, view.media.frame, view.balls) == (1, 12, (BALL,))
 
 
-class TestOtherMatches:
+class TestOtherSources:
     @pytest.mark.parametrize("what", ["split", "match"])
-    def test_a_group_that_a_person_edited_stays_what_it_was(
+    def test_a_group_of_another_match_or_split_is_left_out(
         self, store: Store, tmp_path: Path, what: str
     ) -> None:
         made = []
@@ -159,24 +161,95 @@ class TestOtherMatches:
             info = {} if what == "split" else {f"{folder}/match_info.json": match_info(name)}
             made.append(zipped(tmp_path / f"{name}.zip", {f"{folder}/00001.json": lines, **info}))
         bring(store, made[0], "sn-calibration")
+        before = first_group(store).group
+        for dry_run in (True, False):
+            report = bring(store, made[1], "sn-calibration", dry_run=dry_run)
+            assert (report.changed, report.findings) == (0, 0)
+            (problem,) = report.left_out.problems
+            assert (
+                "test.zip, 00001: is also the name of another group, which came from train.zip"
+                in str(problem)
+            )
+        assert first_group(store).group == before
+
+    @pytest.mark.parametrize("what", ["split", "match"])
+    def test_of_the_same_source_what_a_person_edited_stays_what_it_was(
+        self, store: Store, tmp_path: Path, what: str
+    ) -> None:
+        def bring_part(name: str, lines: object) -> IngestReport:
+            folder = name if what == "split" else "x"
+            info = {} if what == "split" else {f"{folder}/match_info.json": match_info(name)}
+            made = zipped(tmp_path / "x.zip", {f"{folder}/00001.json": lines, **info})
+            return bring(store, made, "sn-calibration")
+
+        bring_part("train", TOP)
         before = draw_ball(store).group
-        report = bring(store, made[1], "sn-calibration")
+        report = bring_part("test", BOTTOM)
         assert (report.changed, report.findings) == (1, 1)
         assert first_group(store).group == before
         with store.read() as session:
             assert replay_log(session) == read_state_snapshot(session)
 
-    def test_what_took_the_place_of_another_source_is_told(
+    def test_other_pictures_under_the_same_names_are_left_out(
         self, store: Store, tmp_path: Path
     ) -> None:
-        train = zipped(tmp_path / "train.zip", {"train/00001.json": TOP, "train/00002.json": TOP})
-        test = zipped(tmp_path / "test.zip", {"test/00001.json": BOTTOM, "test/00003.json": TOP})
-        assert bring(store, train, "sn-calibration").problems == []
-        told = f"1 group came from {train} before and now has other pictures or annotations from {test}"
-        for dry_run in (True, False):
-            assert bring(store, test, "sn-calibration", dry_run=dry_run).problems == [told]
-        assert bring(store, test, "sn-calibration").problems == []
-        assert first_group(store).group.split == "test"
+        bring(store, zipped(tmp_path / "a.zip", {"0001.jpg": RED}))
+        before = accept(store)
+        other = zipped(tmp_path / "b.zip", {"0001.jpg": BLUE, "0002.jpg": BLUE})
+        report = bring(store, other)
+        assert (report.new, report.changed, len(report.left_out.problems)) == (1, 0, 1)
+        assert (first_group(store).group, status(store)) == (before.group, "accepted")
+
+    def test_corrected_lines_of_the_same_picture_are_followed(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        for name, lines in (("a", TOP), ("b", BOTTOM)):
+            members = {"train/00001.json": lines, "train/00001.jpg": RED}
+            report = bring(store, zipped(tmp_path / f"{name}.zip", members), "sn-calibration")
+        told = "1 group came from a.zip before and now has other pictures or annotations from b.zip"
+        assert (report.changed, report.problems) == (1, [told])
+
+    def test_the_same_lines_on_a_picture_that_was_encoded_anew_are_followed(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        for name, shown in (("a", RED), ("b", BLUE)):
+            members = {"train/00001.json": TOP, "train/00001.jpg": shown}
+            report = bring(store, zipped(tmp_path / f"{name}.zip", members), "sn-calibration")
+        assert (report.changed, report.left_out.problems) == (1, [])
+
+
+class TestVerdicts:
+    def test_a_verdict_does_not_move_to_another_picture(self, store: Store, tmp_path: Path) -> None:
+        bring(store, zipped(tmp_path / "a" / "pics.zip", {"0001.jpg": RED}))
+        accept(store)
+        other = picture((0, 0, 200))
+        report = bring(store, zipped(tmp_path / "b" / "pics.zip", {"0001.jpg": other}))
+        assert report.problems == [
+            "1 verdict was withdrawn, because the picture that was judged has been replaced by another"
+        ]
+        assert status(store) == "unreviewed"
+        with store.read() as session:
+            assert replay_log(session) == read_state_snapshot(session)
+
+    def test_a_verdict_follows_its_picture_into_another_file(
+        self, store: Store, tmp_path: Path
+    ) -> None:
+        bring(store, zipped(tmp_path / "a" / "pics.zip", {"0001.jpg": RED}))
+        accept(store)
+        report = bring(store, zipped(tmp_path / "b" / "pics.zip", {"0001.jpg": RED}))
+        assert (report.changed, status(store)) == (1, "accepted")
+
+
+def accept(store: Store) -> GroupState:
+    state = first_group(store)
+    return set_verdict(
+        store, state.id, "accepted", note="looked at", if_match=state.etag, actor="ann"
+    )
+
+
+def status(store: Store) -> str:
+    (row, *_) = list_groups(store, get_dataset(store, "cup").id, limit=9).items
+    return row.status
 
 
 def match_info(match: str) -> dict[str, object]:

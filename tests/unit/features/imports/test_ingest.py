@@ -107,6 +107,7 @@ class TestIngest:
         assert vars(again(store)) == {
             "new": 0, "changed": 0, "unchanged": 0, "findings": 0, "missing": 0, "problems": [],
             "without_picture": 0, "left_out": ReaderReport(), "dropped_views": {}, "replaced": {},
+            "withdrawn": 0,
         }  # fmt: skip
         with pytest.raises(NotFoundError):
             get_dataset(store, "demo")
