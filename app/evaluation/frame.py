@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from urllib.parse import unquote
 
 from app.formats.fields import id_to_text
 from app.formats.frame_names import (
@@ -145,6 +146,7 @@ class NamedFrame:
     Attributes:
         station: Key of a static camera, or empty.
         picture: Name of its picture's file with the last folder, ``images/0004.jpg``, or empty.
+        path: Where its picture is read, or empty.
     """
 
     id: int
@@ -154,6 +156,7 @@ class NamedFrame:
     size: ImageSize
     station: str = ""
     picture: str = ""
+    path: str = ""
 
 
 @dataclass(frozen=True)
@@ -166,7 +169,9 @@ class FrameNameIndex:
     The names that exports give to frames are known, too.
 
     A name that does not tell the match means a frame only where no folder before it could be
-    another match: ``7_1.png`` and ``labels/test/7_1.txt``, but not ``epl/Arsenal/7_1.png``.
+    another match: ``7_1.png`` and ``labels/test/7_1.txt``, but not ``epl/Arsenal/7_1.png``. Where
+    frames have no match and the names of their views tell them apart, folders say nothing. The path
+    by which a picture is read is always its name.
     """
 
     frames: Mapping[int, NamedFrame]
@@ -177,6 +182,9 @@ class FrameNameIndex:
     _stations: Mapping[str, tuple[int, ...]] = field(default_factory=dict, repr=False)
     """Frames of a static camera, and views of one match that are called alike, by their names."""
     _holders: HolderFolders = field(default_factory=HolderFolders, repr=False)
+    _paths: Mapping[str, int] = field(default_factory=dict, repr=False)
+    _folders_tell: bool = True
+    """Whether a folder may be that of another match or group."""
 
     @staticmethod
     def of(frames: Iterable[NamedFrame]) -> FrameNameIndex:
@@ -213,7 +221,20 @@ class FrameNameIndex:
         holders = HolderFolders(
             name for frame in known.values() for name in (frame.group, frame.match)
         )
-        return FrameNameIndex(known, index, frozenset(telling), numbered, by_station, holders)
+        paths: dict[str, int] = {}
+        for frame in known.values():
+            if frame.path and paths.setdefault(_strip_suffix(frame.path), frame.id) != frame.id:
+                paths[_strip_suffix(frame.path)] = _SEVERAL
+        return FrameNameIndex(
+            known,
+            index,
+            frozenset(telling),
+            numbered,
+            by_station,
+            holders,
+            paths,
+            _folders_tell_frames_apart(list(known.values())),
+        )
 
     def find(self, name: str) -> NamedFrame | None:
         """The one frame that a name means, or None.
@@ -276,15 +297,33 @@ class FrameNameIndex:
         return ()
 
     def _find_frame_id(self, name: str) -> int | None:
-        parts = _strip_suffix(name).split("/")
+        if name.startswith("file://"):
+            name = unquote(name.removeprefix("file://"))
+        stem = _strip_suffix(name)
+        if stem in self._paths:
+            return self._paths[stem]
+        parts = stem.split("/")
         for start in range(len(parts)):
             known = "/".join(parts[start:])
             # 7_1 of a match that the dataset does not have is not the 7_1 that it has.
-            if known in self._telling or not self._holders.find_other_folders(parts[:start]):
+            if (
+                not self._folders_tell
+                or known in self._telling
+                or not self._holders.find_other_folders(parts[:start])
+            ):
                 found = self._index.get(known)
                 if found is not None:
                     return found
         return None
+
+
+def _folders_tell_frames_apart(frames: Sequence[NamedFrame]) -> bool:
+    """Whether a folder may name the match or the group of a frame."""
+    if any(frame.match or frame.station or "/" in frame.view for frame in frames):
+        return True
+    groups = {frame.group for frame in frames}
+    alone = len(groups) == 1 and any(frame.group != frame.view for frame in frames)
+    return alone or len({_strip_suffix(frame.view) for frame in frames}) < len(frames)
 
 
 def _parse_number(text: str) -> int | None:
@@ -319,6 +358,8 @@ def _distinguishing_names(frame: NamedFrame) -> set[str]:
         names = within if frame.station else set()
     if not frame.station:
         names.add(f"{group}/{view}")
+        if not match and "/" in view:
+            names.add(view)
     return _add_separator_variants(names) | {name for name in _exported_names(frame) if name}
 
 

@@ -182,6 +182,7 @@ def read_frame_names(store: Store, dataset: str | int) -> FrameNameIndex:
             size=ImageSize(row.width, row.height),
             station=row.station if row.shared else "",
             picture=_make_picture_name(row.media),
+            path=_make_picture_path(row.media),
         )
         for row in rows
     )
@@ -325,6 +326,13 @@ def _make_picture_name(media: Media | None) -> str:
     if media is None or media.frame is not None:
         return ""
     return "/".join(PurePosixPath(media.member or split_pinned_address(media.path)[0]).parts[-2:])
+
+
+def _make_picture_path(media: Media | None) -> str:
+    """Where a picture is read, a member of an archive below the archive; empty as above."""
+    if media is None or media.frame is not None:
+        return ""
+    return media.path if media.member is None else f"{media.path}/{media.member}"
 
 
 def _make_reading_report(boxes: LoadedPredictions, cameras: LoadedPredictedCameras) -> Json:

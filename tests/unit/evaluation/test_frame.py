@@ -122,6 +122,47 @@ class TestFind:
         assert found.find("x/cam3/358.jpg").id == 2
         assert found.find("x/7_1.png") is None
 
+    @pytest.mark.parametrize(
+        "name",
+        [
+            "/home/me/data/images/0004.jpg",
+            "C:\\me\\images\\0004.jpg",
+            "file:///x/0004.jpg",
+            "../images/0004.jpg",
+            "/content/dataset/test/images/0004.txt",
+            "https://example.org/files/0004.jpg",
+        ],
+    )
+    def test_where_views_alone_tell_frames_apart_folders_say_nothing(self, name: str) -> None:
+        frames = [NamedFrame(n, f"000{n}.jpg", f"000{n}.jpg", "", SIZE) for n in (4, 5)]
+        assert FrameNameIndex.of(frames).find(name).id == 4
+
+    def test_folders_tell_groups_apart_whose_views_are_called_alike(self) -> None:
+        frames = [
+            NamedFrame(n, f"kick-{n}", view, "", SIZE)
+            for n, view in ((1, "north.jpg"), (2, "north.jpg"), (3, "east.jpg"))
+        ]
+        index = FrameNameIndex.of(frames)
+        assert index.find("x/kick-2/north.jpg").id == 2
+        assert index.find("kick-4/east.jpg") is None
+        assert FrameNameIndex.of(frames[:1]).find("kick-4/north.jpg") is None
+
+    def test_a_view_with_folders_of_its_own_is_found_below_others(self) -> None:
+        frames = [NamedFrame(n, f"task_{n}/0.png", f"task_{n}/0.png", "", SIZE) for n in (1, 2)]
+        index = FrameNameIndex.of(frames)
+        assert index.find("/home/me/task_2/0.png").id == 2
+        assert index.find("/home/me/task_3/0.png") is None
+
+    def test_the_path_of_its_picture_is_a_name_of_every_frame(self) -> None:
+        frames = [
+            NamedFrame(n, "7.png", f"7_{n}.png", ALDER, SIZE, path=f"/mine/{n}/a b.jpg")
+            for n in (1, 2)
+        ]
+        index = FrameNameIndex.of(frames)
+        assert index.find("/mine/2/a b.jpg").id == 2
+        assert index.find("file:///mine/2/a%20b.jpg").id == 2
+        assert index.find("/theirs/2/a b.jpg") is None
+
 
 class TestOfStation:
     def test_is_every_frame_of_the_camera(self, names) -> None:
