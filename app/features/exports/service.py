@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -295,14 +296,20 @@ def list_format_availability(
         NotFoundError: There is no such dataset or version.
     """
     answers = []
-    for format in FORMATS:  # noqa: A001
-        options = _ExportOptions(format, version is None, "optimized", "none", "all")
+    options = _ExportOptions(CARRY, version is None, views="all")
+    with store.read() as session:
         try:
-            _require_exportable_in_format(store, dataset, options, version)
+            source = _FirstGroupsSource(_open_source(session, store, dataset, options, version))
         except InputError as error:
-            answers.append(FormatAvailability(format, error.message, error.hint))
-        else:
-            answers.append(FormatAvailability(format))
+            return [FormatAvailability(format, error.message, error.hint) for format in FORMATS]  # noqa: A001
+        for format in FORMATS:  # noqa: A001
+            try:
+                _require_no_version_conflict(format, options.everything, version)
+                _require_groups_fit_format(session, store, source, replace(options, format=format))
+            except InputError as error:
+                answers.append(FormatAvailability(format, error.message, error.hint))
+            else:
+                answers.append(FormatAvailability(format))
     return answers
 
 
@@ -310,19 +317,23 @@ def _require_exportable_in_format(
     store: Store, dataset: str | int, options: _ExportOptions, version: str | None
 ) -> None:
     """``require_exportable`` of one format."""
-    format, everything = options.format, options.everything  # noqa: A001
-    _require_no_version_conflict(format, everything, version)
-    with store.read() as session, TemporaryDirectory(prefix="touchline-") as folder:
+    everything = options.everything or options.format == CARRY
+    _require_no_version_conflict(options.format, options.everything, version)
+    with store.read() as session:
         whole = _open_source(
-            session,
-            store,
-            dataset,
-            replace(options, everything=everything or format == CARRY),
-            version,
+            session, store, dataset, replace(options, everything=everything), version
         )
-        if format == CARRY:
-            return
-        source = _FirstGroupsSource(whole)
+        _require_groups_fit_format(session, store, _FirstGroupsSource(whole), options)
+
+
+def _require_groups_fit_format(
+    session: Session, store: Store, source: _FirstGroupsSource, options: _ExportOptions
+) -> None:
+    """Raises InputError where the groups of a source cannot be written as asked for."""
+    format = options.format  # noqa: A001
+    if format == CARRY:
+        return
+    with TemporaryDirectory(prefix="touchline-") as folder:
         frames = ExportImageWriter(
             Path(folder), "none", _make_local_picture_reader(store), find_frame_path_rule(format)
         )
@@ -337,10 +348,10 @@ def _require_exportable_in_format(
             except InputError as error:
                 raise _UnrepresentableError(error.message, hint=error.hint) from error
         if options.images != "none" and not frames.media:
-            files = [] if source.is_whole_source else list_frame_files(session, whole.dataset_id)
-            _require_frames(whole.dataset, files)
+            files = [] if source.is_whole_source else list_frame_files(session, source.dataset_id)
+            _require_frames(source.dataset, files)
     if source.is_whole_source and run.tracks is None:
-        _require_content(whole.dataset, format, counts)
+        _require_content(source.dataset, format, counts)
 
 
 def _require_frames(dataset: str, files: Iterable[str]) -> None:
@@ -372,7 +383,7 @@ def _require_no_version_conflict(format: str, everything: bool, version: str | N
 
 
 class _FirstGroupsSource:
-    """The first groups of a source."""
+    """The first groups of a source, which are read once for all formats that are tried."""
 
     def __init__(self, source: LiveSource | VersionSource):
         self._source = source
@@ -386,13 +397,21 @@ class _FirstGroupsSource:
         """Whether there are no more."""
         return self.count == self._source.count
 
+    @cached_property
+    def _items(self) -> list[Item]:
+        return list(islice(self._source.items(), self.count))
+
+    @cached_property
+    def _outlines(self) -> list[Outline]:
+        return list(islice(self._source.outlines(), self.count))
+
     def items(self) -> Iterator[Item]:
         """As many as are tried."""
-        return islice(self._source.items(), self.count)
+        return iter(self._items)
 
     def outlines(self) -> Iterator[Outline]:
         """The same groups with what names their files."""
-        return islice(self._source.outlines(), self.count)
+        return iter(self._outlines)
 
 
 def _make_local_picture_reader(store: Store) -> ReadPicture:

@@ -4,13 +4,16 @@ import csv
 import json
 import zipfile
 import zlib
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
+from app.db.store import Store
 from app.errors import InputError, NotFoundError
 from app.features.exports.service import (
     FORMATS,
@@ -424,6 +427,16 @@ class TestPossibleFormats:
         assert refused == ["issia-3d", "issia", *TRACKS]
         assert "cannot be from ISSIA" in answers["issia"].reason
         assert tuple(answers) == FORMATS
+
+    def test_the_groups_are_read_once_for_all_formats(
+        self, store: Store, three: object, counted: Callable[..., Any]
+    ) -> None:
+        with counted(store) as one:
+            require_exportable(store, "demo", "parquet", everything=True)
+        with counted(store) as every:
+            list_format_availability(store, "demo")
+        assert every.reads == 1
+        assert every.statements < 3 * one.statements
 
     def test_of_static_cameras_it_is_the_other_way_round(self, store, fill, make_static) -> None:
         fill(make_static(10))
