@@ -66,6 +66,7 @@ ENDINGS = (
     (".json", "coco"),
     (".jsonl", "coco"),
     (".txt", "yolo"),
+    (".parquet", "tracks"),
 )
 """Formats by the endings of their files; where several are there, the first."""
 _NAMES = ("file_name", "filename", "image_name", "image_path", "image", "path")

@@ -11,13 +11,15 @@ each direction) or ``sigma_x_m,sigma_y_m,sigma_z_m`` say how sure each is. ``eve
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import get_args
 
-from app.errors import DatasetFormatError
+from app.errors import DatasetFormatError, InputError
 from app.evaluation.frame import NamedFrame
 from app.evaluation.prediction_run import (
     FieldError,
@@ -67,7 +69,11 @@ _MEANT = (
     "a table of predictions has a frame (image, file_name or frame; or match, main_action, replay) and a box "
     "in pixels (x, y, w, h from the upper left corner; x1, y1, x2, y2; cx, cy, w, h; or ball_bbox)"
 )
+_MOT_FOLDERS = ("gt", "det")
+_GAME = "gameinfo.ini"
+_TRACKLET = re.compile(r"^\s*trackletID_(\d{1,9})\s*=\s*([^;\r\n]*)", re.MULTILINE | re.ASCII)
 _MOT = ("frame", "id", "bb_left", "bb_top", "bb_width", "bb_height", "conf")
+_SEPARATOR = re.compile(rb"(?:\xef\xbb\xbf)?sep=.\r?\n", re.IGNORECASE)
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+(?:[eE][+-]?\d+)?\s*", re.ASCII)
 _NUMBERS_ONLY = re.compile(rb"\s*[-+.\d][-+.\deE]*(?:\s*,\s*[-+.\d][-+.\deE]*){5,}\s*", re.ASCII)
 
@@ -79,32 +85,97 @@ def is_mot_text(content: bytes) -> bool:
 
 
 def read_table(tree: FileTree, path: Path, run: PredictionCollector, limits: ImportLimits) -> None:
-    """Read the one table of a tree.
+    """Read the one table of a tree, or MOT's tables, one a sequence.
 
     Raises:
         DatasetFormatError: There is none, or several, or its columns say no frame or no box.
+        InputError: A table of MOT does not say which of its tracks is the ball.
     """
     names = [name for name in tree.names() if name.lower().endswith((".csv", ".tsv"))]
     if not names:
         texts = [name for name in tree.names() if name.lower().endswith(".txt")]
         names = [name for name in texts if is_mot_text(tree.read_bytes(name))]
-    if len(names) != 1:
-        what = "no CSV file" if not names else f"{len(names)} CSV files; give exactly one"
-        raise DatasetFormatError(str(path), None, None, f"contains {what}")
-    shown = tree.shown(names[0])
+        if len({_find_sequence_folder(name) for name in names}) < len(names):
+            listed = ", ".join(names[:4])
+            message = (
+                f"contains several MOT tables of one sequence ({listed}); give exactly one of each"
+            )
+            raise DatasetFormatError(str(path), None, None, message)
+    elif len(names) > 1:
+        listed = ", ".join(names[:4])
+        message = f"contains {len(names)} tables ({listed}); give exactly one"
+        raise DatasetFormatError(str(path), None, None, message)
+    if not names:
+        raise DatasetFormatError(str(path), None, None, "contains no table (CSV, or MOT's .txt)")
+    for name in names:
+        _read_one_table(tree, name, run, limits, alone=len(names) == 1)
+
+
+def _read_one_table(
+    tree: FileTree, name: str, run: PredictionCollector, limits: ImportLimits, *, alone: bool
+) -> None:
+    shown, content = tree.shown(name), tree.read_bytes(name)
+    tracks = _read_mot_tracks(tree, name, content, run) if is_mot_text(content) else None
     columns: list[str] | None = None
-    for line, cells in _read_rows(tree.read_bytes(names[0]), shown, limits):
+    for line, cells in _read_rows(content, shown, limits):
         if columns is None:
             columns = list(cells)
             if problem := _find_column_problem(columns):
                 raise DatasetFormatError(shown, None, None, problem)
         run.found.report.read += 1
         with report_invalid_record(run.found.report, shown, f"line {line}"):
-            _add_row(run, cells)
+            _add_row(run, cells, tracks, alone)
     if columns is None:
         raise DatasetFormatError(
             shown, None, None, "contains no rows; check that the file is complete"
         )
+
+
+@dataclass(frozen=True)
+class _MotTracks:
+    """What the place of a table of MOT says.
+
+    Attributes:
+        folder: Of the sequence, without ``gt``; empty where there is none.
+        labels: What the tracks are by their ids; None where nothing says it and a frame has one at most.
+    """
+
+    folder: str
+    labels: Mapping[int, str] | None
+
+
+def _find_sequence_folder(name: str) -> str:
+    """The sequence of a table of MOT: ``SNMOT-060`` of ``SNMOT-060/gt/gt.txt`` and ``SNMOT-060.txt``."""
+    parts = list(PurePosixPath(name).with_suffix("").parts)
+    while parts and parts[-1].lower() in _MOT_FOLDERS:
+        parts.pop()
+    return "/".join(parts)
+
+
+def _read_mot_tracks(
+    tree: FileTree, name: str, content: bytes, run: PredictionCollector
+) -> _MotTracks:
+    folder = _find_sequence_folder(name)
+    ini = f"{folder}/{_GAME}" if folder else _GAME
+    text = tree.read_bytes(ini).decode("utf-8", "replace") if ini in tree.names() else ""
+    labels = {int(number): label.strip() for number, label in _TRACKLET.findall(text)}
+    if labels or not _has_several_tracks(content):
+        return _MotTracks(folder, labels or None)
+    if run.category is None:
+        raise InputError(
+            f"{tree.shown(name)} has several tracks in a frame and does not say which of them is the ball",
+            hint=f"Put the {_GAME} of the sequence beside it, or name the id of the ball's track as category."
+            " Where all of them are balls, write a table with a header (frame,x,y,w,h,score).",
+            pointer="/category",
+        )
+    return _MotTracks(folder, labels)
+
+
+def _has_several_tracks(content: bytes) -> bool:
+    """Whether a frame of a table of MOT has rows of several tracks."""
+    ids: dict[bytes, bytes] = {}
+    rows = (line.split(b",", 2) for line in content.splitlines() if line.count(b",") > 1)
+    return any(ids.setdefault(frame.strip(), one.strip()) != one.strip() for frame, one, _ in rows)
 
 
 def _read_rows(
@@ -120,10 +191,11 @@ def _read_rows(
                 boxed["conf"] = ""
             yield line - 1, boxed
         return
-    delimiter, _ = _read_header(content)
-    for line, cells in read_rows(content, shown, (), limits, delimiter=delimiter):
+    text, above = _strip_excel_marks(content)
+    delimiter, _ = _read_header(text)
+    for line, cells in read_rows(text, shown, (), limits, delimiter=delimiter):
         yield (
-            line,
+            line + above,
             {
                 _plain_column_name(name): (
                     text.replace(",", ".")
@@ -137,9 +209,18 @@ def _read_rows(
 
 def _read_header(content: bytes) -> tuple[str, list[str]]:
     """What stands between the cells of a table, and the plain names of its columns."""
+    content, _ = _strip_excel_marks(content)
     first = content[:65536].split(b"\n", 1)[0].decode("utf-8-sig", "replace")
     delimiter = max(",;\t", key=first.count)
     return delimiter, [_plain_column_name(name.strip('"\r ')) for name in first.split(delimiter)]
+
+
+def _strip_excel_marks(content: bytes) -> tuple[bytes, int]:
+    """A table as UTF-8, without Excel's first line ``sep=;``; and how many lines that were."""
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        content = content.decode("utf-16", "replace").encode()
+    first = _SEPARATOR.match(content)
+    return (content, 0) if first is None else (content[first.end() :], 1)
 
 
 def _plain_column_name(name: str) -> str:
@@ -160,15 +241,22 @@ def _find_column_problem(columns: Iterable[str]) -> str | None:
     return f"has the columns {listed}{more}; {_MEANT}"
 
 
-def _add_row(run: PredictionCollector, cells: Mapping[str, str]) -> None:
+def _add_row(
+    run: PredictionCollector, cells: Mapping[str, str], tracks: _MotTracks | None, alone: bool
+) -> None:
     box, where = _read_row_box(cells)
     if box is None:
         return
     score_name = next((name for name in SCORES if not is_missing(cells.get(name))), None)
     score = read_field(cells, score_name, fields.parse_number) if score_name else None
-    if not _is_ball_row(run, cells):
+    if not _is_ball_row(run, cells, tracks):
         return
-    frame = _find_row_frame(run, cells)
+    frame = None if tracks is None else _find_sequence_frame(run, tracks.folder, cells["frame"])
+    if tracks is None or (frame is None and alone):
+        frame = _find_row_frame(run, cells)
+    elif frame is None:
+        name = f"{tracks.folder}/{cells['frame'].strip()}"
+        run.count_unknown_frame(name, run.names.explain_unknown_name(name))
     if frame is not None:
         size = None
         if not is_missing(cells.get("img_w")) and not is_missing(cells.get("img_h")):
@@ -180,11 +268,27 @@ def _add_row(run: PredictionCollector, cells: Mapping[str, str]) -> None:
             run.add_detection(frame, box, score, size)
 
 
-def _is_ball_row(run: PredictionCollector, cells: Mapping[str, str]) -> bool:
-    """Whether the class of a row is the ball's."""
+def _find_sequence_frame(run: PredictionCollector, folder: str, number: str) -> NamedFrame | None:
+    """The frame of a number in the folder of a sequence, or in the match that is called like it."""
+    picture = number.strip().zfill(6)
+    for place in (folder, folder.rsplit("/", 1)[-1]) if folder else ():
+        for name in (f"{place}/img1/{picture}", f"{place}/{picture}"):
+            if (found := run.names.find(name)) is not None:
+                run.matched = True
+                return found
+    return None
+
+
+def _is_ball_row(
+    run: PredictionCollector, cells: Mapping[str, str], tracks: _MotTracks | None
+) -> bool:
+    """Whether the class of a row is the ball's, or its track."""
+    if tracks is not None and tracks.labels is not None:
+        track = read_field(cells, "id", fields.parse_whole_number)
+        return run.count_class_and_check_ball(track, tracks.labels.get(track, ""))
     column = next((name for name in _CLASSES if not is_missing(cells.get(name))), None)
     if column is None:
-        return run.count_class_and_check_ball(0)
+        return run.count_class_and_check_ball(0, "" if tracks is None else "ball")
     text = cells[column].strip()
     named = next(
         (cells[name].strip() for name in _CLASS_NAMES if not is_missing(cells.get(name))), ""
@@ -274,7 +378,9 @@ def read_tracks(
     names = names or [name for name in tables if is_ball_track_table(tree.read_bytes(name))]
     folders = [str(PurePosixPath(name).parent) for name in names]
     if not names or len(set(folders)) < len(folders):
-        what = "no ball.csv" if not names else "several tables of balls in one folder"
+        what = "several tables of balls in one folder" if names else "no ball.csv"
+        if any(PurePosixPath(name).name == "ball.parquet" for name in tree.names()):
+            what = "ball.parquet and no ball.csv; give ball.csv, which an export of tracks writes beside it"
         raise DatasetFormatError(str(path), None, None, f"contains {what}")
     found = {}
     for name, folder in zip(names, folders, strict=True):

@@ -61,6 +61,11 @@ class TestReadAuto:
         for place in (path, path.parent):
             assert read_predictions(place, "auto", names).format == format_
 
+    def test_a_track_as_parquet_alone_is_named(self, tmp_path: Path, names) -> None:
+        write(tmp_path / "ball.parquet", "PAR1")
+        with pytest.raises(DatasetFormatError, match=r"give ball\.csv, which an export of tracks"):
+            read_predictions(tmp_path, "auto", names)
+
     def test_a_folder_with_several_formats_is_read_by_its_tables(self, tmp_path, names) -> None:
         write(tmp_path / "a.json", [result()])
         write(tmp_path / "c.txt", YOLO)
@@ -75,7 +80,7 @@ class TestReadPredictions:
         [
             ("coco", "x.csv", "contains no COCO results"),
             ("yolo", "x.csv", "contains no text files"),
-            ("csv", "x.json", "contains no CSV file"),
+            ("csv", "x.json", "contains no table (CSV, or MOT's .txt)"),
         ],
     )
     def test_a_file_of_another_kind_is_named_and_not_its_folder(
@@ -471,10 +476,53 @@ class TestCsv:
 
     @pytest.mark.parametrize("ending", ["txt", "csv"])
     def test_reads_the_files_of_mot(self, tmp_path, names, ending: str) -> None:
-        text = "7,1,10,20,8,9,0.5,-1,-1,-1\n7,2,30,20,8,9,-1,-1,-1,-1\n"
+        text = "7,-1,10,20,8,9,0.5,-1,-1,-1\n7,-1,30,20,8,9,-1,-1,-1,-1\n"
         found = read_predictions(write(tmp_path / f"gt.{ending}", text), "auto", names)
         assert [item.box.x for item in found.detections[1]] == [10, 30]
         assert (found.format, found.without_score) == ("csv", 1)
+
+    def test_reads_the_sequences_of_mot_each_by_its_folder(self, tmp_path: Path) -> None:
+        frames = [
+            NamedFrame(n, f"SNMOT-{n}/00000{n}.jpg", "000001.jpg", f"SNMOT-{n}", SIZE)
+            for n in (1, 2)
+        ]
+        for n in (1, 2):
+            folder = tmp_path / f"test/SNMOT-{n}"
+            rows = f"1,1,10,20,8,9,1,-1,-1,-1\n1,{n + 1},{n}00,20,8,9,1,-1,-1,-1\n"
+            write(folder / "gt/gt.txt", rows)
+            write(
+                folder / "gameinfo.ini",
+                f"[Sequence]\ntrackletID_1= player team left;10\ntrackletID_{n + 1}= ball;1\n",
+            )
+        found = read_predictions(tmp_path, "auto", FrameNameIndex.of(frames))
+        assert [found.detections[n][0].box.x for n in (1, 2)] == [100, 200]
+        assert (found.boxes, found.report.counts["other classes"]) == (2, 2)
+
+    def test_tracks_of_mot_need_to_say_which_is_the_ball(self, tmp_path: Path, names) -> None:
+        text = "7,1,10,20,8,9,0.5,-1,-1,-1\n7,2,30,20,8,9,0.5,-1,-1,-1\n"
+        path = write(tmp_path / "gt.txt", text)
+        with pytest.raises(InputError, match="does not say which of them is the ball"):
+            read_predictions(path, "auto", names)
+        found = read_predictions(path, "auto", names, category=2)
+        assert [item.box.x for item in found.detections[1]] == [30]
+
+    def test_several_tables_are_named(self, tmp_path: Path, names) -> None:
+        for name in ("a.csv", "b.csv"):
+            write(tmp_path / name, CSV)
+        with pytest.raises(DatasetFormatError, match=r"contains 2 tables \(a.csv, b.csv\)"):
+            read_predictions(tmp_path, "auto", names)
+        for name in ("x/gt/gt.txt", "x/det/det.txt"):
+            write(tmp_path / "mot" / name, "7,1,10,20,8,9,0.5,-1,-1,-1\n")
+        with pytest.raises(DatasetFormatError, match="several MOT tables of one sequence"):
+            read_predictions(tmp_path / "mot", "auto", names)
+
+    @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+    def test_reads_what_excel_writes(self, tmp_path: Path, names, encoding: str) -> None:
+        path = tmp_path / "p.csv"
+        path.write_text("sep=;\nimage;x;y;w;h\n7.png;10,5;20;8;9\n7.png;a;0;1;1\n", encoding)
+        found = read_predictions(path, "auto", names)
+        assert found.detections[1][0].box.x == 10.5
+        assert [record for record, *_ in problems(found)] == ["line 4"]
 
     @pytest.mark.parametrize(
         ("text", "words"),
