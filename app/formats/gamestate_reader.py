@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
@@ -23,6 +24,7 @@ from app.formats.trees import open_tree_context
 from app.soccer.annotation import BallAnnotation, Extras, Lines
 from app.soccer.frames import MAX_SIDE, Box, ImageSize
 from app.soccer.group import Group, Media, Station, View
+from app.wording import plural
 
 LABELS = "Labels-GameState.json"
 METADATA = "gamestate"
@@ -154,6 +156,8 @@ class _LabelledSequence:
         if not isinstance(value, dict):
             raise DatasetFormatError(self.path, None, None, "is not an object")
         self._value = value
+        self._left_out: list[DatasetFormatError] = []
+        self._left_out_by_id: IdIndex[DatasetFormatError] = IdIndex()
         self._folder = name[: -len(LABELS)]
         self._inside = list_files_in_folder(names, self._folder)
         self.key = self._sequence_key()
@@ -200,6 +204,7 @@ class _LabelledSequence:
                     self.path, str(record["file_name"]), "image_id", problem
                 )
             images.append(image)
+        self._report_left_out_images(index)
         self._join_annotations(index)
         common = {name: self._value[name] for name in ("info", "categories") if name in self._value}
         for image in images:
@@ -220,7 +225,7 @@ class _LabelledSequence:
         """Sound image records with their ids, each name once."""
         for index, record in enumerate(self._get_list("images")):
             self._report.read += 1
-            where = f"images[{index}]"
+            where, image = f"images[{index}]", record
             try:
                 image = fields.require_object(record)
                 key = image.get("file_name")
@@ -233,16 +238,57 @@ class _LabelledSequence:
                         f"has the file_name {key} of an earlier record; this record is left out"
                     )
                 size = ImageSize(
-                    _read_side_length(image, "width"), _read_side_length(image, "height")
+                    self._read_side_length(image, "width", where),
+                    self._read_side_length(image, "height", where),
                 )
+            except DatasetFormatError as error:
+                self._leave_image_out(image, error)
+                continue
             except UnsafePathError as error:
-                self._report.add_problem_at(self.path, where, "file_name", error.message)
+                problem = DatasetFormatError(self.path, where, "file_name", error.message)
+                self._leave_image_out(image, problem)
                 continue
             except ValueError as error:
-                self._report.add_problem_at(self.path, where, None, str(error))
+                self._leave_image_out(image, DatasetFormatError(self.path, where, None, str(error)))
                 continue
             names.add(PurePosixPath(key).stem)
             yield image.get("image_id", image.get("id")), image, size
+
+    def _read_side_length(self, image: Mapping[str, Any], name: str, where: str) -> int:
+        try:
+            side = fields.parse_whole_number(image.get(name))
+            if not 2 <= side <= MAX_SIDE:
+                raise ValueError(f"is {side} pixels, not 2 to {MAX_SIDE:,}")
+        except ValueError as error:
+            raise DatasetFormatError(self.path, where, name, str(error)) from error
+        return side
+
+    def _leave_image_out(self, image: Any, error: DatasetFormatError) -> None:
+        self._left_out.append(error)
+        if isinstance(image, dict):
+            self._left_out_by_id.add(image.get("image_id", image.get("id")), error)
+
+    def _report_left_out_images(self, images: IdIndex[_AnnotatedImage]) -> None:
+        """Say why each image is left out, with how many annotations go with it."""
+        listed = self._value.get("annotations") if self._left_out else None
+        counts = Counter(
+            self._find_left_out_image_record(item, images)
+            for item in (listed if isinstance(listed, list) else [])
+        )
+        for error in self._left_out:
+            count = counts[error.record]
+            more = f"; left out with {plural(count, 'annotation')}" if count else ""
+            self._report.add_problem_at(
+                self.path, error.record, error.field, f"{error.problem}{more}"
+            )
+
+    def _find_left_out_image_record(
+        self, annotation: Any, images: IdIndex[_AnnotatedImage]
+    ) -> str | None:
+        """Which image that is left out an annotation is of, by its record; None where it is of none."""
+        identity = annotation.get("image_id") if isinstance(annotation, dict) else None
+        error = self._left_out_by_id.find(identity) if images.find(identity) is None else None
+        return None if error is None else error.record
 
     def _join_annotations(self, images: IdIndex[_AnnotatedImage]) -> None:
         """Give each annotation to its image; one that joins none is named."""
@@ -251,6 +297,8 @@ class _LabelledSequence:
             where = f"annotations[{index}]"
             image = images.find(item.get("image_id")) if isinstance(item, dict) else None
             if image is None:
+                if self._find_left_out_image_record(item, images) is not None:
+                    continue
                 self._report.add_problem_at(
                     self.path, where, "image_id", "names no image of the file"
                 )
@@ -323,13 +371,6 @@ def _find_split_in_folders(parts: tuple[str, ...]) -> str:
     said = next((part for part in reversed(parts) if part in SPLITS), "")
     # A sequence may have a name like ``test-12``: the folder around the sequences says the split.
     return said or next(filter(None, map(parse_split_name, reversed(parts[:-2]))), "")
-
-
-def _read_side_length(image: Mapping[str, Any], name: str) -> int:
-    side = fields.parse_whole_number(image.get(name))
-    if not 2 <= side <= MAX_SIDE:
-        raise ValueError(f"has a {name} of {side} pixels, not of 2 to {MAX_SIDE:,}")
-    return side
 
 
 def _read_bbox_image(item: Mapping[str, Any]) -> Box:

@@ -186,6 +186,16 @@ class TestReadGamestate:
             f"annotations[{n}]" for n in range(5, 9)
         ]
 
+    def test_an_image_that_is_left_out_names_its_field_and_takes_its_annotations(
+        self, read: Read, labels: Value, report: ReaderReport
+    ) -> None:
+        labels["images"].append({"image_id": "9", "file_name": "y.jpg", "width": None, "height": 9})
+        labels["annotations"] += [annotation("6", "9", 1), annotation("7", "9", 1)]
+        read(labels)
+        (problem,) = report.problems
+        assert (problem.record, problem.field) == ("images[2]", "width")
+        assert problem.problem == "is null, not a number; left out with 2 annotations"
+
     @pytest.mark.parametrize("value", [[], {"images": {}, "annotations": []}, "x"])
     def test_what_is_no_such_file_is_reported(
         self, read: Read, report: ReaderReport, value: Any
