@@ -130,7 +130,7 @@ def pair_truth_with_detections(
     return judged
 
 
-_SUFFIX = re.compile(r"\.(png|jpe?g|webp|bmp|txt|json)$", re.IGNORECASE | re.ASCII)
+_SUFFIX = re.compile(r"\.(png|jpe?g|jfif|webp|bmp|txt|json)$", re.IGNORECASE | re.ASCII)
 _NUMBER = re.compile(r"(?:frame|image|img)?[ _-]?(\d{1,9})", re.IGNORECASE | re.ASCII)
 _DIGITS = re.compile(r"\d{1,9}", re.ASCII)
 _MATCH = " - "

@@ -15,7 +15,7 @@ from app.object_store.path import split_pinned_address
 from app.soccer.annotation import Extras
 from app.soccer.group import Group, View
 
-IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp")
+IMAGE_SUFFIXES = (".jpg", ".jpeg", ".jfif", ".png", ".webp")
 VIDEO_SUFFIXES = (
     *(".mp4", ".avi", ".mpg", ".mpeg", ".mkv", ".mov"),
     *(".m4v", ".ts", ".mts", ".m2ts", ".webm", ".wmv", ".flv", ".ogv", ".3gp"),

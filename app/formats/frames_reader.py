@@ -32,7 +32,7 @@ from app.wording import plural
 _HEADS = (16 * 1024, 1024 * 1024)
 """Bytes of a picture in which its size is looked for."""
 _TAIL, _MOST = 4096, 256 * 2**20
-"""Bytes at the end of a JPEG among which its picture usually ends, and that are read of one at most."""
+"""Bytes at the end of a JPEG among which its picture usually ends, and that are read of a picture at most."""
 IS_VIDEO = (
     "is a video: bring it in as a recording (import video, or the page Recordings), and take frames "
     "from it"
@@ -160,7 +160,7 @@ def _read_views(
             size = _read_image_size(tree, name, size_of)
             # Of a store only the beginning is read.
             if not isinstance(tree, StoreTree):
-                _require_whole_jpeg(tree, name)
+                _require_whole_picture(tree, name)
         except DatasetFormatError as error:
             report.add_problem(error)
             continue
@@ -182,28 +182,33 @@ def _read_image_size(tree: FileTree, name: str, size_of: SizeOf) -> ImageSize:
     raise DatasetFormatError(shown, None, None, problem)
 
 
-def _require_whole_jpeg(tree: FileTree, name: str) -> None:
-    """Raise where a JPEG ends before its picture: decoders fill the rest with grey and do not say so."""
+def _require_whole_picture(tree: FileTree, name: str) -> None:
+    """Raise where a file ends before its picture: of a JPEG decoders fill the rest with grey and do not
+    say so, a PNG cannot be shown. A WebP says its length, which its header is checked with."""
     try:
         with tree.open(name) as file:
-            data = file.read(2)
-            if data != b"\xff\xd8":
-                return
-            data += file.read(_MOST)
+            data = file.read(_MOST)
     except BROKEN as error:
         raise DatasetFormatError(
             tree.shown(name), None, None, "is damaged, or its zip file is"
         ) from error
-    if b"\xff\xd9" in data[-_TAIL:]:
-        return
+    if not _ends_with_picture(data):
+        raise DatasetFormatError(
+            tree.shown(name), None, None, "is cut off: the end of its picture is missing"
+        )
+
+
+def _ends_with_picture(data: bytes) -> bool:
+    """Whether a file has all of its picture, as far as its format tells."""
+    if data.startswith(b"\x89PNG"):
+        return len(data) == _MOST or b"IEND" in data
+    if not data.startswith(b"\xff\xd8") or b"\xff\xd9" in data[-_TAIL:]:
+        return True
     # A small picture among the headers ends with the same two bytes.
     place = 2
     while data[place : place + 1] == b"\xff" and data[place + 1 : place + 2] != b"\xda":
         place += 2 + max(int.from_bytes(data[place + 2 : place + 4], "big"), 2)
-    if b"\xff\xd9" not in data[place:]:
-        raise DatasetFormatError(
-            tree.shown(name), None, None, "is cut off: the end of its picture is missing"
-        )
+    return b"\xff\xd9" in data[place:]
 
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")

@@ -82,6 +82,20 @@ class TestReadFrames:
         assert told["c.jpg"] == "is damaged in its header"
         assert told["wide.png"].startswith("declares 600 x 10 pixels")
 
+    def test_a_png_that_is_cut_off_is_named(self, tmp_path: Path, report: ReaderReport) -> None:
+        noise = np.random.default_rng(1).integers(0, 255, (200, 300, 3)).astype(np.uint8)
+        Image.fromarray(noise).save(tmp_path / "whole.png")
+        whole = (tmp_path / "whole.png").read_bytes()
+        (tmp_path / "cut.png").write_bytes(whole[: len(whole) // 2])
+        assert [group.key for group in read(tmp_path, report)] == ["whole.png"]
+        (problem,) = report.problems
+        assert problem.problem == "is cut off: the end of its picture is missing"
+
+    def test_jfif_is_a_jpeg(self, shots: Path, report: ReaderReport) -> None:
+        (shots / "b.jpg").rename(shots / "b.jfif")
+        assert "b.jfif" in [group.key for group in read(shots, report)]
+        assert report.problems == []
+
     def test_a_jpeg_that_is_cut_off_is_named(self, tmp_path: Path, report: ReaderReport) -> None:
         thumbnail, noise = BytesIO(), np.random.default_rng(1).integers(0, 255, (200, 300, 3))
         Image.new("RGB", (16, 9)).save(thumbnail, "JPEG")
