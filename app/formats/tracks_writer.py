@@ -372,12 +372,17 @@ def write_cdf(root: Path, records: Iterable[TrackRecord]) -> dict[str, int]:
     have no players.
 
     Returns:
-        Counts: ``tracks``, ``frames`` and ``frames_with_ball``.
+        Counts: ``tracks``, ``frames``, ``frames_with_ball``, ``balls_too_far_away`` (left out) and
+        ``balls_raised_to_the_grass`` (below it, written with z = 0).
 
     Source: Common Data Format 0.3.2 (arXiv 2505.15820), tracking.
     """
     counts = {"tracks": 0, "frames": 0, "frames_with_ball": 0}
+    counts |= {"balls_too_far_away": 0, "balls_raised_to_the_grass": 0}
     for folder, record in create_track_folders(root, records):
+        near = _is_within_cdf_limits(record)
+        counts["balls_too_far_away"] += int((record.has_position & ~near).sum())
+        counts["balls_raised_to_the_grass"] += int((record.track.position[near, 2] > 0).sum())
         lines = [f"{json_text(line)}\n" for line in _make_cdf_frames(record)]
         (folder / CDF).write_text("".join(lines), encoding="utf-8")
         counts["tracks"] += 1
@@ -405,10 +410,7 @@ def _format_tracab_metadata(record: TrackRecord) -> str:
 def _make_cdf_frames(record: TrackRecord) -> Iterator[dict[str, Any]]:
     track = record.track
     nobody = {side: {"id": side, "players": list[Any]()} for side in ("home", "away")}
-    there = record.has_position & (np.abs(np.nan_to_num(track.position[:, :2])) <= CDF_LIMITS).all(
-        axis=1
-    )
-    rows = np.flatnonzero(there).tolist()
+    rows = np.flatnonzero(_is_within_cdf_limits(record)).tolist()
     for row in rows:
         x, y, z = (track.position[row] * (1, -1, -1)).tolist()
         yield {
@@ -419,6 +421,12 @@ def _make_cdf_frames(record: TrackRecord) -> Iterator[dict[str, Any]]:
             "teams": nobody,
             "ball": {"x": x, "y": y, "z": max(z, 0.0), "status": track.mode[row] != "out"},
         }
+
+
+def _is_within_cdf_limits(record: TrackRecord) -> BoolArray:
+    """Frames whose ball the Common Data Format has room for, shape (N,)."""
+    place = np.abs(np.nan_to_num(record.track.position[:, :2]))
+    return np.asarray(record.has_position & (place <= CDF_LIMITS).all(axis=1))
 
 
 def _timestamp(seconds: float) -> str:

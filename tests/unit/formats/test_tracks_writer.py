@@ -218,6 +218,8 @@ class TestWriteCdf:
             "tracks": 1,
             "frames": 60,
             "frames_with_ball": 58,
+            "balls_too_far_away": 0,
+            "balls_raised_to_the_grass": 0,
         }
         assert read_by(VALIDATOR, tmp_path, tmp_path) == {"valid": True, "raised": []}
 
@@ -232,11 +234,13 @@ class TestWriteCdf:
         assert lines[30]["ball"] == {"x": x, "y": -y, "z": -z, "status": True}
         assert lines[-1]["ball"]["status"] is False
 
-    def test_a_ball_beyond_what_it_has_room_for_is_left_out(
+    def test_balls_that_it_has_no_room_for_are_counted(
         self, flight_record: TrackRecord, tmp_path: Path
     ) -> None:
         position = flight_record.track.position.copy()
-        position[5, 1] = 43.0
+        position[5, 1], position[6, 2] = 43.0, 0.02
         far = replace(flight_record, track=replace(flight_record.track, position=position))
-        assert write_cdf(tmp_path, [far])["frames_with_ball"] == 57
+        counts = write_cdf(tmp_path, [far])
+        assert counts["frames_with_ball"] == 57
+        assert (counts["balls_too_far_away"], counts["balls_raised_to_the_grass"]) == (1, 1)
         assert read_by(VALIDATOR, tmp_path, tmp_path) == {"valid": True, "raised": []}
