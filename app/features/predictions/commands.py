@@ -330,6 +330,7 @@ def _detect_or_import_boxes(
         print_error(
             f"  the file has {plural(kept.unknown, 'frame')} that the recording does not have"
         )
+    _print_problems(vars(kept))
 
 
 def _parse_frame_range(text: str) -> range:

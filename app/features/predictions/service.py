@@ -343,11 +343,12 @@ def _make_reading_report(boxes: LoadedPredictions, cameras: LoadedPredictedCamer
         "unknown_boxes": sum(boxes.unknown.values()),
         "unknown_frames": list(list_unknown_frames(boxes.unknown, boxes.reasons, LISTED)),
         "unknown_cameras": list(list_unknown_frames(cameras.unknown, cameras.reasons, LISTED)),
-        **_list_problems(boxes.report, cameras.report),
+        **list_reading_problems(boxes.report, cameras.report),
     }
 
 
-def _list_problems(*reports: ReaderReport) -> dict[str, Any]:
+def list_reading_problems(*reports: ReaderReport) -> dict[str, Any]:
+    """What readers left out: the first ``problems``, and how many ``more_problems`` there are."""
     every = [problem for report in reports for problem in report.problems]
     dropped = sum(report.dropped for report in reports)
     return {

@@ -7,7 +7,7 @@ recording by name of their set, and goes with the video.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any, Protocol
@@ -15,6 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from app.config import Settings
+from app.db.json_columns import Json
 from app.db.store import Store
 from app.durable import replace_file
 from app.errors import InputError, NotFoundError, StorageError
@@ -22,6 +23,7 @@ from app.evaluation.frame import Detection, FrameNameIndex, NamedFrame
 from app.evaluation.prediction_files import AUTO, read_predictions
 from app.features.audit.service import add_audit_event
 from app.features.datasets.service import read_dataset_head, require_valid_name
+from app.features.predictions.service import list_reading_problems
 from app.features.recordings.index import read_index
 from app.features.recordings.queries import list_names_and_paths
 from app.features.recordings.service import Details, Recording, get_recording
@@ -55,6 +57,8 @@ class SavedBoxesReport:
         boxes: How many are kept.
         looked_at: Frames that a detector looked at; of a file those of the recording.
         unknown: Names in a file that are no frames of the recording.
+        problems: Rows of a file that were left out, each with its reason.
+        more_problems: How many more there are.
     """
 
     name: str
@@ -62,6 +66,8 @@ class SavedBoxesReport:
     boxes: int
     looked_at: int
     unknown: int = 0
+    problems: Sequence[Mapping[str, Json]] = ()
+    more_problems: int = 0
 
 
 def find_recording(store: Store, dataset: str, name: str) -> Recording:
@@ -151,7 +157,8 @@ def import_boxes_from_file(
         number: [one for one in boxes if one.score >= min_score]
         for number, boxes in read.detections.items()
     }
-    return _replace_box_set(store, recording, name, sure, count, len(read.unknown), actor)
+    kept = _replace_box_set(store, recording, name, sure, count, len(read.unknown), actor)
+    return replace(kept, **list_reading_problems(read.report))
 
 
 def read_detected_balls_in_frames(

@@ -75,6 +75,15 @@ class TestFile:
         assert (one.x, one.y, one.diameter, one.score) == (108.5, 66.5, 9.0, 0.8)
         assert collect_follow_hints(store, recording, range(9, FRAMES)).detected == {}
 
+    def test_rows_that_are_left_out_are_named(
+        self, store: Store, recording: Recording, tmp_path: Path
+    ) -> None:
+        path = written(tmp_path / "seen.csv", (8, 104, 62, 9, 9, 0.8), (8, 104, 62, -9, 9, 0.8))
+        kept = import_boxes_from_file(store, recording, path, "seen", min_score=0.1, actor="ann")
+        (problem,) = kept.problems
+        assert (problem["file"], problem["record"]) == ("seen.csv", "line 3")
+        assert (kept.boxes, kept.more_problems) == (1, 0)
+
     def test_a_set_takes_the_place_of_one_of_its_name_and_stands_beside_others(
         self, store: Store, recording: Recording, tmp_path: Path
     ) -> None:
