@@ -48,6 +48,10 @@ _ENDINGS = ".json, .jsonl, .npz, .yml"
 _IMAGE = re.compile(r"\.(?:png|jpe?g|webp|bmp|tiff?)", re.ASCII | re.IGNORECASE)
 _ROOT = re.compile(r"^(?:[A-Za-z]:)?/+")
 
+OPENTRACKIO = (
+    "is OpenTrackIO, which Touchline writes and does not read; import the camera files (camera_<frame>.json) "
+    "that it was made of"
+)
 _WRAPPERS = (
     "cam_params",
     "camera",
@@ -277,6 +281,9 @@ def _parse_camera_items(
 
 def _list_named_cameras(value: Any, shown: str, report: ReaderReport) -> _Items | None:
     """The cameras by name when the file holds several, else None."""
+    protocol = value.get("protocol") if isinstance(value, dict) else None
+    if isinstance(protocol, dict) and protocol.get("name") == "OpenTrackIO":
+        raise DatasetFormatError(shown, None, "protocol.name", OPENTRACKIO)
     if isinstance(value, dict) and isinstance(value.get("cameras"), (dict, list)):
         value = value["cameras"]
     elif (

@@ -236,6 +236,21 @@ class TestReadCameras:
         assert len(report.problems) == 1
         assert what in str(report.problems[0])
 
+    def test_opentrackio_is_named_in_one_sentence(
+        self, tmp_path: Path, report: ReaderReport
+    ) -> None:
+        sample = {
+            "protocol": {"name": "OpenTrackIO", "version": [1, 0, 1]},
+            "lens": {},
+            "timing": {},
+        }
+        (tmp_path / "sample_0.json").write_text(json.dumps(sample))
+        assert read_cameras(tmp_path, report) == {}
+        (problem,) = report.problems
+        assert problem.problem.startswith(
+            "is OpenTrackIO, which Touchline writes and does not read"
+        )
+
 
 Solved = Callable[..., ExportRecord]
 Make = Callable[..., Group]
