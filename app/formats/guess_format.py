@@ -113,6 +113,10 @@ MAX_FILES = 40
 HEAD_BYTES = 64 * 1024
 CONVERT = f"Touchline does not import that; {EXPORT}"
 YOLO = f"they contain no cameras and no groups; {EXPORT}, or give predictions to {EVALUATE}"
+MOT = (
+    f"they contain no cameras and no groups; give them to {EVALUATE} as predictions, or import the pictures "
+    "as frames"
+)
 NO_PLACES = "it contains no positions in pictures"
 PREDICTED = f"it holds predictions, not annotations; give it to {EVALUATE}"
 
@@ -145,6 +149,13 @@ class FormatGuess:
         return any(advice in self.advice and advice in problem for advice in (EVALUATE, EXPORT))
 
 
+LABELME = FormatGuess("LabelMe, a JSON file for each picture")
+VIA = FormatGuess("a project of the VGG Image Annotator (VIA)")
+FIFTYONE = FormatGuess("FiftyOne")
+DATUMARO = FormatGuess("Datumaro")
+YOLO_LABELS = FormatGuess("YOLO labels", None, YOLO)
+
+
 def _compile_key_patterns(*names: str) -> tuple[re.Pattern[bytes], ...]:
     """That all of some keys stand in a JSON text."""
     return tuple(re.compile(rb'"%s"\s*:' % name.encode()) for name in names)
@@ -154,8 +165,11 @@ _MARKING = (
     rb'"(?:Side line|Middle line|Circle|Big rect\.|Small rect\.|Goal) ?[a-z ]{0,30}"\s*:\s*\['
 )
 _NUMBER = rb"-?\d{1,9}(?:\.\d{1,20})?(?:e-?\d{1,3})?"
-_YOLO = re.compile(rb"\A\s*\d{1,4}(?:[ \t]+%s){4,60}[ \t]*(?:\r?\n|\Z)" % _NUMBER)
+_YOLO = re.compile(rb"\A\s*\d{1,4}(?:[ \t]+%s){4,4000}[ \t]*(?:\r?\n|\Z)" % _NUMBER)
 _MOT = re.compile(rb"\A\s*\d{1,9}, ?-?\d{1,9}(?:, ?%s){4,8}\s*(?:\r?\n|\Z)" % _NUMBER)
+
+_TRACAB = re.compile(rb"\A\s*\d{1,9}:(?:[-\d.,]{1,60};){0,60}:(?:[-\d.,]{1,60},\w{0,4},\w{1,8}|;)")
+_STUDIO = rb"(?:rectangle|keypoint|polygon|ellipse|brush)labels"
 
 _Kinds = tuple[tuple[tuple[re.Pattern[bytes], ...], FormatGuess], ...]
 """What is found where all of some patterns are; the first one that fits."""
@@ -168,15 +182,27 @@ _JSON: _Kinds = (
     (_compile_key_patterns("bbox_image"), FormatGuess("gamestate", "gamestate")),
     (
         _compile_key_patterns("shapes", "imagePath"),
-        FormatGuess("LabelMe, a JSON file for each picture"),
+        LABELME,
     ),
+    (_compile_key_patterns("imageData"), LABELME),
     (
         _compile_key_patterns("file_attributes", "regions"),
-        FormatGuess("a project of the VGG Image Annotator (VIA)"),
+        VIA,
     ),
+    (_compile_key_patterns("fid", "fname"), VIA),
     (_compile_key_patterns("from_name", "to_name"), FormatGuess("Label Studio's own JSON")),
+    ((re.compile(rb'"%s"' % _STUDIO),), FormatGuess("Label Studio's JSON-MIN")),
+    (_compile_key_patterns("data_row", "projects"), FormatGuess("Labelbox")),
+    (_compile_key_patterns("item", "slots"), FormatGuess("Darwin JSON of V7")),
+    (_compile_key_patterns("filepath", "samples"), FIFTYONE),
+    (_compile_key_patterns("classes", "labels", "bounding_box"), FIFTYONE),
+    (
+        _compile_key_patterns("frame_id", "teams", "ball"),
+        FormatGuess("tracking of the Common Data Format", None, NO_PLACES),
+    ),
     (_compile_key_patterns("classTitle"), FormatGuess("Supervisely")),
-    (_compile_key_patterns("dm_format_version"), FormatGuess("Datumaro")),
+    (_compile_key_patterns("dm_format_version"), DATUMARO),
+    (_compile_key_patterns("items", "label_id"), DATUMARO),
     (_compile_key_patterns("image", "annotations", "coordinates"), FormatGuess("Create ML")),
     (_compile_key_patterns("images", "annotations"), FormatGuess("coco", "coco")),
     (_compile_key_patterns("images", "categories"), FormatGuess("coco", "coco")),
@@ -204,22 +230,31 @@ _XML: _Kinds = (
     ),
 )
 _TEXT: _Kinds = (
-    ((_YOLO,), FormatGuess("YOLO labels", None, YOLO)),
-    ((_MOT,), FormatGuess("tracks of the MOT challenge")),
+    ((_YOLO,), YOLO_LABELS),
+    ((_MOT,), FormatGuess("tracks of the MOT challenge", None, MOT)),
 )
+_DAT: _Kinds = (((_TRACAB,), FormatGuess("tracking of TRACAB", None, NO_PLACES)),)
 _CSV: _Kinds = (
     (
         (re.compile(rb"\A[^\n]*main_action"), re.compile(rb"\A[^\n]*ball_bbox")),
         FormatGuess("soccernet-v3d", "soccernet-v3d"),
     ),
     ((re.compile(rb"\A[^\n]*x_cam\d"),), FormatGuess("issia-3d", "issia-3d")),
+    ((re.compile(rb"\A[^\n]*region_shape_attributes"),), VIA),
+    ((re.compile(rb'""%s""' % _STUDIO),), FormatGuess("Label Studio's CSV")),
     (
         (re.compile(rb"\A[^\n]*(?:xmin|x_min|bbox)", re.IGNORECASE),),
         FormatGuess("a table of boxes (CSV)"),
     ),
 )
+_EMPTY_LABELS = re.compile(r"(?:^|/)labels/(?:[^/]+/){0,2}[^/]+\.txt$", re.IGNORECASE)
+"""Of YOLO, of pictures without an object where nothing stands in any."""
+_PACKED = re.compile(
+    r"\.(?:tar|tgz|tbz2|txz|7z|rar|zst|(?:tar|jsonl?|csv|txt)\.(?:gz|bz2|xz))$", re.IGNORECASE
+)
 _HEADS = {
-    ".json": _JSON, ".jsonl": _JSON, ".xml": _XML, ".xgtf": _XML, ".txt": _TEXT, ".csv": _CSV,
+    ".json": _JSON, ".jsonl": _JSON, ".ndjson": _JSON, ".xml": _XML, ".xgtf": _XML, ".txt": _TEXT,
+    ".csv": _CSV, ".dat": _DAT,
 }  # fmt: skip
 
 
@@ -255,6 +290,13 @@ def _guess_format_of_tree(tree: FileTree) -> FormatGuess | None:
     )
     if seen:
         return seen.most_common(1)[0][0]
+    if any(_EMPTY_LABELS.search(name) for name in names):
+        return YOLO_LABELS
+    if not heads and (packed := next(filter(_PACKED.search, names), None)) is not None:
+        name = PurePosixPath(packed).name
+        return FormatGuess(
+            f"a packed file ({name})", None, "unpack it; of packed files only zip is read"
+        )
     if not heads and any(suffixes[suffix] for suffix in VIDEO_SUFFIXES):
         return FormatGuess("a video", None, "it has no annotations")
     if not heads and any(suffixes[suffix] for suffix in IMAGE_SUFFIXES):
