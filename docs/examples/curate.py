@@ -7,7 +7,7 @@ what was accepted. Everything here can be taken back in the browser.
 import sys
 
 from touchline import Client
-from touchline.errors import RequestError, StaleError
+from touchline.errors import ServerError, StaleError
 
 address, dataset, name = sys.argv[1:4]
 SURE_M = 0.25
@@ -30,8 +30,8 @@ with Client(address) as client:
     print(", ".join(f"{count} {state}" for state, count in counts.items()))
     try:
         plan = client.post(f"datasets/{dataset}/versions", {"name": name}, params={"dry_run": True})
-    except RequestError as error:
-        sys.exit(f"No version was made: {error}")  # no group can be in it, say
+    except ServerError as error:
+        sys.exit(f"No version was made: {error}")  # no group can be in it, or it exists
     print(f"{plan['groups']} groups would enter version {name}; left out: {plan['left_out']}")
     job = client.wait(client.post(f"datasets/{dataset}/versions", {"name": name}))
     print(job["sentence"])

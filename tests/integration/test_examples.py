@@ -105,6 +105,16 @@ class TestExamples:
         assert "4 accepted, 0 deferred" in told
         assert "4 groups would enter version curated" in told
 
+    def test_where_no_version_can_be_made_the_script_ends_with_a_sentence(
+        self, address: str, tmp_path: Path
+    ) -> None:
+        script = EXAMPLES / "curate.py"
+        run(tmp_path, script, address, "small", "twice")
+        with pytest.raises(AssertionError) as ended:
+            run(tmp_path, script, address, "small", "twice")
+        assert 'No version was made: "small" has a version "twice" already' in str(ended.value)
+        assert "Traceback" not in str(ended.value)
+
 
 class TestPeoplesWork:
     """No example undoes what people decided."""
