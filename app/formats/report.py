@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 from app.errors import DatasetFormatError, InputError, ReviewError
 
@@ -62,3 +65,21 @@ class ReaderReport:
     def make_refusal_error(self, nothing: str) -> ReviewError:
         """Why nothing was read: the first problem, else ``nothing``, a sentence."""
         return self.problems[0] if self.problems else InputError(nothing)
+
+
+def list_first_problems(reports: Sequence[ReaderReport], most: int) -> dict[str, Any]:
+    """What readers left out: ``problems``, at most so many, and how many ``more_problems`` there are."""
+    every = [problem for report in reports for problem in report.problems]
+    dropped = sum(report.dropped for report in reports)
+    return {
+        "problems": [
+            {
+                "file": Path(item.path).name,
+                "record": item.record,
+                "field": item.field,
+                "problem": item.problem,
+            }
+            for item in every[:most]
+        ],
+        "more_problems": max(len(every) - most, 0) + dropped,
+    }

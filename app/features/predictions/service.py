@@ -36,7 +36,7 @@ from app.features.predictions.queries import (
 )
 from app.features.predictions.reader import PredictionFiles, Read, read_files
 from app.formats.file_tree import ImportLimits
-from app.formats.report import ReaderReport
+from app.formats.report import list_first_problems
 from app.geometry.camera import Camera
 from app.json_text import canonical_json_text, quote_text
 from app.object_store.path import split_pinned_address
@@ -343,23 +343,5 @@ def _make_reading_report(boxes: LoadedPredictions, cameras: LoadedPredictedCamer
         "unknown_boxes": sum(boxes.unknown.values()),
         "unknown_frames": list(list_unknown_frames(boxes.unknown, boxes.reasons, LISTED)),
         "unknown_cameras": list(list_unknown_frames(cameras.unknown, cameras.reasons, LISTED)),
-        **list_reading_problems(boxes.report, cameras.report),
-    }
-
-
-def list_reading_problems(*reports: ReaderReport) -> dict[str, Any]:
-    """What readers left out: the first ``problems``, and how many ``more_problems`` there are."""
-    every = [problem for report in reports for problem in report.problems]
-    dropped = sum(report.dropped for report in reports)
-    return {
-        "problems": [
-            {
-                "file": Path(item.path).name,
-                "record": item.record,
-                "field": item.field,
-                "problem": item.problem,
-            }
-            for item in every[:LISTED]
-        ],
-        "more_problems": max(len(every) - LISTED, 0) + dropped,
+        **list_first_problems([boxes.report, cameras.report], LISTED),
     }

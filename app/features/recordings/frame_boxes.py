@@ -23,10 +23,10 @@ from app.evaluation.frame import Detection, FrameNameIndex, NamedFrame
 from app.evaluation.prediction_files import AUTO, read_predictions
 from app.features.audit.service import add_audit_event
 from app.features.datasets.service import read_dataset_head, require_valid_name
-from app.features.predictions.service import list_reading_problems
 from app.features.recordings.index import read_index
 from app.features.recordings.queries import list_names_and_paths
 from app.features.recordings.service import Details, Recording, get_recording
+from app.formats.report import list_first_problems
 from app.progress import ReportProgress
 from app.soccer.frames import ImageSize, box_from_corner_origin
 from app.tracking.ball_run import DetectedBall
@@ -34,6 +34,8 @@ from app.video.frames import read_frames
 
 MOST = 5
 """Boxes of a frame that are kept, the surest: a ball is followed among them."""
+LISTED = 100
+"""Rows of a file that are left out and named; all are counted."""
 _COLUMNS = "set", "frame", "x", "y", "diameter", "score"
 
 
@@ -158,7 +160,7 @@ def import_boxes_from_file(
         for number, boxes in read.detections.items()
     }
     kept = _replace_box_set(store, recording, name, sure, count, len(read.unknown), actor)
-    return replace(kept, **list_reading_problems(read.report))
+    return replace(kept, **list_first_problems([read.report], LISTED))
 
 
 def read_detected_balls_in_frames(
