@@ -302,6 +302,14 @@ class FrameNameIndex:
         stem = _strip_suffix(name)
         if stem in self._paths:
             return self._paths[stem]
+        found = self._find_by_end_of_path(stem)
+        folder, slash, last = stem.rpartition("/")
+        if found is None and slash and _DIGITS.fullmatch(last):
+            # Files of a static camera are called by their frames, ``cam3/000358.jpg``.
+            return self._find_by_end_of_path(f"{folder}/{int(last)}")
+        return found
+
+    def _find_by_end_of_path(self, stem: str) -> int | None:
         parts = stem.split("/")
         for start in range(len(parts)):
             known = "/".join(parts[start:])

@@ -165,6 +165,11 @@ class TestFind:
 
 
 class TestOfStation:
+    def test_a_picture_of_a_static_camera_may_have_zeros_before_its_frame(self, names) -> None:
+        assert names.find("cam3/000358.jpg").id == 4
+        assert names.find("issia/cam3/0359.png").id == 5
+        assert names.find("cam3/000999.jpg") is None
+
     def test_is_every_frame_of_the_camera(self, names) -> None:
         assert names.find_station_frames("camera/cam3.json") == (4, 5)
         assert names.find_station_frames("cam9") == ()
