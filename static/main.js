@@ -7,7 +7,7 @@ import { html, render } from 'htm/preact';
 
 import { beginsAt } from './api/events.js';
 import { startKeys } from './lib/keys.js';
-import { startRouter } from './lib/router.js';
+import { page, startRouter } from './lib/router.js';
 import { startArrivals } from './state/arrival.js';
 import { draft } from './state/group.js';
 import { startInsight } from './state/insight.js';
@@ -26,8 +26,8 @@ import { App } from './views/app.js';
 import { datasetHere, startNeeds } from './views/needs.js';
 
 addEventListener('beforeunload', (event) => {
-	// What is in the outbox comes back with the page; what is in hand or staged does not.
-	const isStaged = Object.values(stagings.value).some((one) => Object.keys(changesOf(one)).length > 0);
+	// What is in the outbox comes back with the page, what is in hand does not; a closed tab loses what is staged.
+	const isStaged = ['review', 'calibration'].includes(page.value.page) && Object.values(stagings.value).some((one) => Object.keys(changesOf(one)).length > 0);
 	if (draft.value || isStaged || (!lasting.value && outbox.value.length > 0)) event.preventDefault();
 });
 

@@ -273,7 +273,8 @@ def evaluate(
     scores = _score_all_cameras(frames, inputs, say)
     judged = pair_truth_with_detections(frames, inputs.detections or {}, options.boxes)
     say(1, 4, "Placing balls")
-    results = _measure_frames(judged, inputs, scores, options)
+    kinds = list_kinds_of_boxes(frames, inputs.reference or {})
+    results = _measure_frames(judged, inputs, scores, options, kinds)
     say(2, 4, "Average precision")
     tables, figures = [], []
     if inputs.detections is not None:
@@ -330,9 +331,9 @@ def _measure_frames(
     inputs: EvaluationInputs,
     scores: tuple[Scores, Scores] | None,
     options: EvaluationOptions,
+    kinds: Sequence[str],
 ) -> list[FrameResult]:
     cameras, reference = inputs.cameras or {}, inputs.reference or {}
-    kinds = list_kinds_of_boxes((item.frame for item in judged), reference)
     results = []
     for item in judged:
         frame = item.frame

@@ -12,11 +12,11 @@ import { label, strokeBox, strokeLine } from './pen.js';
 /** @param {CanvasRenderingContext2D} context @param {Scene} scene */
 export function drawGhosts(context, scene) {
 	const { ghosts = [], picture } = scene;
-	for (const { view, kind, base, mine } of ghosts) {
+	for (const { view, kind, base, mine, unchanged } of ghosts) {
 		if (view !== picture.view.key) continue;
 		for (const { value, word, colour } of [
 			{ value: base, word: 'before', colour: colours.value.muted },
-			{ value: mine, word: 'yours', colour: colours.value.selected },
+			...(unchanged ? [] : [{ value: mine, word: 'yours', colour: colours.value.selected }]),
 		]) {
 			if (kind === 'ball') ghostBall(context, scene, /** @type {BallJson[]} */ (value), word, colour);
 			else if (kind === 'lines') ghostLine(context, scene, /** @type {Marked} */ (value).points, word, colour);

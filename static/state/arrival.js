@@ -46,7 +46,7 @@ async function enter(id) {
 
 /** Ask again for the group that could not be shown, if there is one that may return. */
 export function retry() {
-	if (absent.value && mayReturn.value) enter(absent.value);
+	if (absent.value && mayReturn.value && currentId() === absent.value) enter(absent.value);
 }
 
 /** Without a number: the first group of the queue. */
@@ -84,8 +84,11 @@ export function startArrivals() {
 		// Another query has other neighbours.
 		query.value;
 		untracked(() => {
-			if (at.page !== 'review') resetForGroup();
-			else if (at.group === null) enterFirst();
+			if (at.page !== 'review') {
+				resetForGroup();
+				absent.value = 0;
+				if (said && notice.value === said) dismiss();
+			} else if (at.group === null) enterFirst();
 			else enter(at.group);
 		});
 	});

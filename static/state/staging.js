@@ -20,8 +20,9 @@ export const stagings = stored('staged-lines', /** @type {Record<string, Staging
 
 /** The markings of a group that are staged and not saved, and the first view that has some. @param {GroupDocument} group */
 export function stagedIn({ views }) {
-	const staged = views.flatMap(({ key, station, lines }) => {
-		const kept = stagings.value[station.id];
+	const staged = views.flatMap(({ key, station, lines }, at) => {
+		const isFirst = views.findIndex((view) => view.station.id === station.id) === at;
+		const kept = isFirst ? stagings.value[station.id] : undefined;
 		return kept ? Object.keys(changesOf(rebase(kept, lines))).map(() => key) : [];
 	});
 	return { count: staged.length, view: staged.at(0) };

@@ -68,7 +68,7 @@ function FieldRow({ field }) {
 export function ConflictBar() {
 	const present = conflict.value;
 	if (!present) return null;
-	const drawn = present.fields.some(({ kind }) => kind === 'ball' || kind === 'lines');
+	const drawn = present.fields.some(({ kind, unchanged }) => !unchanged && (kind === 'ball' || kind === 'lines'));
 	return html`
 		<section class="bar conflict" data-tone="warn" role="alert" aria-label="Conflict">
 			<div class="conflict__words">

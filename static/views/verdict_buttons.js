@@ -17,7 +17,7 @@ import {
 } from '../state/verdicts.js';
 import { stagedIn } from '../state/staging.js';
 import { commentDraft, keepCommentDraft } from '../state/threads.js';
-import { asking } from '../state/workspace.js';
+import { asking, focused } from '../state/workspace.js';
 import { SubmitButton } from './lease_bar.js';
 import { SwapAsk } from './swap_ask.js';
 
@@ -72,7 +72,7 @@ function ReasonList({ title, choose, again, keys, suggested = null }) {
 
 /** @param {{group: number, title: string, button: string, onNote?: (note: string) => void}} props */
 function NoteForm({ group, title, button, onNote = answer }) {
-	const draft = `verdict-note ${asking.value}`;
+	const draft = `verdict-note ${asking.value}${asking.value === 'viewNote' ? ` ${focused.value}` : ''}`;
 	const field = useRef(/** @type {HTMLInputElement | null} */ (null));
 	// Before the next key: who types at once must not find the letters doing something else.
 	useLayoutEffect(() => field.current?.focus(), []);
@@ -107,6 +107,9 @@ function NoteForm({ group, title, button, onNote = answer }) {
 function StagedAsk({ group }) {
 	const { count, view } = stagedIn(group);
 	const open = () => navigate(editorAddress(group.id, view ?? ''));
+	const first = useRef(/** @type {HTMLButtonElement | null} */ (null));
+	// Enter means what it says also after a click on Accept.
+	useLayoutEffect(() => first.current?.focus(), []);
 	useKeys(useMemo(() => [
 		{ keys: ['Enter'], label: 'Open the calibration editor', group: 'Verdict', run: open },
 		{ keys: ['m'], label: 'Accept without what is staged', group: 'Verdict', run: acceptAsSaved },
@@ -116,7 +119,7 @@ function StagedAsk({ group }) {
 		<section class="ask" aria-label=${title}>
 			<p class="ask__title">${title} <kbd>Esc</kbd></p>
 			<p class="ask__buttons">
-				<button class="button button--primary" type="button" onClick=${open}>Open the editor <kbd>Enter</kbd></button>
+				<button class="button button--primary" type="button" ref=${first} onClick=${open}>Open the editor <kbd>Enter</kbd></button>
 				<button class="button" type="button" onClick=${acceptAsSaved}>Accept anyway <kbd>M</kbd></button>
 			</p>
 		</section>
@@ -140,12 +143,12 @@ function acceptTitle(group) {
 function Ask({ group }) {
 	if (asking.value === 'reason') return html`<${ReasonList} key="group" ...${GROUP_REASONS} suggested=${suggestedReason(group.solution)} />`;
 	if (asking.value === 'view') return html`<${ReasonList} key="view" ...${VIEW_REASONS} />`;
-	if (asking.value === 'viewNote') return html`<${NoteForm} group=${group.id} title="Why is this view left out?" button="Leave out" onNote=${rejectViewBecause} />`;
-	if (asking.value === 'note') return html`<${NoteForm} group=${group.id} title="What is wrong with this group?" button="Reject" />`;
+	if (asking.value === 'viewNote') return html`<${NoteForm} key=${`view ${focused.value}`} group=${group.id} title="Why is this view left out?" button="Leave out" onNote=${rejectViewBecause} />`;
+	if (asking.value === 'note') return html`<${NoteForm} key="reject" group=${group.id} title="What is wrong with this group?" button="Reject" />`;
 	if (asking.value === 'staged') return html`<${StagedAsk} group=${group} />`;
 	if (asking.value === 'swap') return html`<${SwapAsk} group=${group} />`;
 	if (asking.value !== 'override') return null;
-	return html`<${NoteForm} group=${group.id} title=${acceptTitle(group)} button="Accept" />`;
+	return html`<${NoteForm} key="accept" group=${group.id} title=${acceptTitle(group)} button="Accept" />`;
 }
 
 /** @param {{group: GroupDocument}} props */

@@ -300,12 +300,18 @@ class WebhookSender:
                 if done:
                     with self._store.write() as session:
                         for task in done:
-                            self._save_attempt(session, tries.pop(task), task.result())
+                            self._save_attempt(session, tries[task], task.result())
+                    for task in done:
+                        del tries[task]
                     ended += len(done)
                 if look is not None and time.monotonic() - looked >= LOOK_SECONDS:
-                    look()
-                    begin_due_tries()
                     looked = time.monotonic()
+                    try:
+                        look()
+                        begin_due_tries()
+                    except ReviewError as error:
+                        # The tries under way go on.
+                        log.warning("new webhook messages could not be read", error=str(error))
             for task in tries:
                 task.cancel()
             await asyncio.gather(*tries, return_exceptions=True)
