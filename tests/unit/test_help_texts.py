@@ -25,7 +25,7 @@ from tests.docs.settings import SETTINGS_PAGE, settings_page
 AGAIN = "run: python -m tests.docs"
 PLAIN_WORDS = """
     3d accept access account action actions actors address adjudicate adjust adjustments adopt
-    accepted again reopen undecided advice after ahead anchor app around arrays arrival ask assign attempt axis backup bar bars
+    again reopen undecided advice after ahead anchor app around arrays arrival ask assign attempt axis backup bar bars
     batches before block blocks body boxes browser bulk bundle button buttons cache calibrate
     candidates canvas caption card cards cell changes chart chip choice chooser class cli client
     clip clock cluster codec colours command comment comments compare comparison completion config

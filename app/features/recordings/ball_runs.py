@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -312,16 +312,25 @@ def _follow_click(
 
 
 def _apply_run_to_views(
-    store: Store, run: StoredRun, accepted: bool, actor: str, paint: PaintUpdater | None
+    store: Store,
+    run: StoredRun,
+    accepted: bool,
+    actor: str,
+    paint: PaintUpdater | None,
+    frames: Collection[int] | None = None,
 ) -> dict[str, int]:
-    """Give the views of a run's frames its balls, or take those away that come from it; returns ``StoredRun.groups``
-    as they are then if the run is accepted."""
+    """Give the views of a run's frames, or of some of them, its balls, or take those away that come from it; returns
+    ``StoredRun.groups`` as they are then if the run is accepted."""
     trusted, items = run.trusted_balls, list[ViewEdits]()
     counts = {"placed": 0, "kept": 0, "refused": 0}
     with store.read() as session:
         # The file may have been replaced since; views keep the video that the run is of.
         shown = list_views_of_video(session, run.dataset_id, run.sha256)
-        shown = [view for view in shown if view.number in trusted]
+        shown = [
+            view
+            for view in shown
+            if view.number in trusted and (frames is None or view.number in frames)
+        ]
         ids = sorted({view.group for view in shown})
         for start in range(0, len(ids), _BATCH):
             some = ids[start : start + _BATCH]
@@ -333,6 +342,9 @@ def _apply_run_to_views(
                     one.balls for one in groups[view.group].group.views if one.key == view.key
                 )
                 mine = run.make_annotation(trusted[view.number])
+                if frames is not None and accepted and balls == (mine,):
+                    # Another view of this frame was there before.
+                    continue
                 if accepted and balls and balls != (mine,):
                     counts["kept"] += 1
                     continue
@@ -347,6 +359,39 @@ def _apply_run_to_views(
     if not accepted:
         counts = {**counts, "placed": counts["refused"], "kept": run.groups.get("kept", 0)}
     return counts
+
+
+def give_accepted_balls(store: Store, frames: Sequence[tuple[int, int]], actor: str) -> None:
+    """Give views that were made after runs were accepted their balls, as accepting them does.
+
+    Args:
+        store: The database.
+        frames: That the views show: the recording's id and the number.
+        actor: Who made the views.
+    """
+    for recording in sorted({recording for recording, _ in frames}):
+        numbers = {number for one, number in frames if one == recording}
+        with store.read() as session:
+            sha256 = require_recording(session, recording).sha256
+            found = [
+                build_run_from_row(row, sha256)
+                for row in list_ball_run_rows(session, recording)
+                if row.accepted_by is not None
+            ]
+        for run in found:
+            mine = numbers & {*run.trusted_balls}
+            if run.stale or {ACCEPTING, REMOVING} & {*run.groups} or not mine:
+                continue
+            counts = _apply_run_to_views(store, run, True, actor, None, mine)
+            with store.write() as session:
+                row = find_ball_run(session, run.id)
+                is_accepted = row is not None and row.accepted_by is not None
+                if is_accepted:
+                    # No other revision: whoever sees the run may take it back.
+                    sums = {name: run.groups.get(name, 0) + count for name, count in counts.items()}
+                    update_ball_run(session, run.id, groups=canonical_json_text(sums))
+            if row is not None and not is_accepted:
+                _apply_run_to_views(store, run, False, actor, None, mine)
 
 
 def _make_set_balls_edit(view: str, balls: tuple[BallAnnotation, ...]) -> Sequence[Edit]:

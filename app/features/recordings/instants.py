@@ -21,11 +21,7 @@ from app.errors import ImageError, InputError, StorageError
 from app.features.file_tools.track import frame_to_row
 from app.features.groups.queries import StoredGroup, read_groups
 from app.features.imports.ingest import BATCH, ImportContext, IngestReport, import_group_chunk
-from app.features.recordings.accepted_balls import (
-    NewGroup,
-    RecordedFrame,
-    add_accepted_balls,
-)
+from app.features.recordings.ball_runs import give_accepted_balls
 from app.features.recordings.cameras import SOURCE, read_cameras_of_frames
 from app.features.recordings.index import read_index
 from app.features.recordings.link_frames import find_linked_frames
@@ -165,10 +161,14 @@ def make_groups_of_instants(
     progress(done, total)
     tracked = read_cameras_of_frames(store, recording, wanted)
     live = [_ShownFrame(recording, index, number, tracked.get(number)) for number in wanted]
-    groups = _build_groups(store, live, replays.of, there)
+    groups, left = _build_groups(store, live, replays.of, there), live
     while not dry_run and (batch := list(islice(groups, BATCH))):
         with store.write() as session:
-            import_group_chunk(session, origin, add_accepted_balls(session, batch), report, set())
+            import_group_chunk(session, origin, batch, report, set())
+        some, left = left[: len(batch)], left[len(batch) :]
+        made = [one for one in some if one.number not in there]
+        made += [view for one in some for view in replays.of.get(one.number, ())]
+        give_accepted_balls(store, [(one.recording.id, one.number) for one in made], actor)
         done += len(batch)
         progress(done, total)
     linked_views = [view for number in wanted for view in replays.of.get(number, ())]
@@ -239,7 +239,7 @@ def _build_groups(
     live: Sequence[_ShownFrame],
     linked: Mapping[int, Sequence[_ShownFrame]],
     there: Mapping[int, int],
-) -> Iterator[NewGroup]:
+) -> Iterator[Group]:
     """Groups of live frames with further views of replays; those that are there keep the views that they have."""
     settings = store.settings
     for start in range(0, len(live), BATCH):
@@ -253,11 +253,8 @@ def _build_groups(
             match = one.recording.name
             key = f"{match}/{one.number}.png"
             stored = known.get(there.get(one.number, 0))
-            new = dict[str, RecordedFrame]()
             if stored is None:
-                name = f"{one.number}.png"
-                views = [_build_view(settings, one, name, key)]
-                new[name] = RecordedFrame(one.recording, one.number)
+                views = [_build_view(settings, one, f"{one.number}.png", key)]
             else:
                 views = [_strip_edits_from_view(stored, view, one) for view in stored.group.views]
             for other in linked.get(one.number, ()):
@@ -266,9 +263,7 @@ def _build_groups(
                     name = f"{other.recording.name}_{name}"
                 if all(name != view.key for view in views):
                     views.append(_build_view(settings, other, name, f"{key}/{name}"))
-                    new[name] = RecordedFrame(other.recording, other.number)
-            group = Group(key, tuple(views), match=match, label=f"Frame {one.number}")
-            yield NewGroup(group, new)
+            yield Group(key, tuple(views), match=match, label=f"Frame {one.number}")
 
 
 def _strip_edits_from_view(stored: StoredGroup, view: View, live: _ShownFrame) -> View:
