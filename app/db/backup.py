@@ -361,7 +361,8 @@ def _count_frames_elsewhere(connection: Any, home: Path, folders: Sequence[str])
 def _iterate_files(home: Path, folders: Sequence[str]) -> Iterator[Path]:
     """Files of folders, in order, and the small ones of recordings; half-written ones are nobody's yet."""
     if RECORDINGS not in folders:
-        yield from sorted((home / RECORDINGS).glob("*.npz"))
+        small = sorted((home / RECORDINGS).glob("*.npz"))
+        yield from (path for path in small if not is_half_written(path, home))
     for name in folders:
         walk = os.walk(home / name)
         for path in sorted(Path(folder, file) for folder, _, files in walk for file in files):

@@ -5,6 +5,7 @@ Log, tables and frozen versions keep the path that a file had when it came into 
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -20,16 +21,22 @@ _OF_SOME_FILE = re.compile(r"/((?:practice|sample)/.+)", re.DOTALL)
 
 def find_path_in_home(path: str, home: Path) -> str:
     """Where a file lies in a home whose files were in another folder before; any other path as it is."""
-    if not path.startswith("/"):
+    if not path.startswith("/") or ".." in path.split("/"):
         return path
-    for known in (_OF_ONE_FILE, _OF_SOME_FILE):
-        found = known.search(path)
-        if found is None or path == (there := f"{home}/{found[1]}"):
-            continue
+    if found := _OF_ONE_FILE.search(path):
+        there = f"{home}/{found[1]}"
+        return there if path != there and _exists(there) else path
+    if found := _OF_SOME_FILE.search(path):
+        there = f"{home}/{found[1]}"
         # A folder of somebody else's may be called "sample".
-        if (known is _OF_ONE_FILE or not Path(path).exists()) and Path(there).exists():
+        if path != there and not _exists(path) and _exists(there):
             return there
     return path
+
+
+def _exists(path: str) -> bool:
+    # That of pathlib raises where a folder must not be looked into.
+    return os.path.exists(path)  # noqa: PTH110
 
 
 def set_home_of_engine(engine: Engine, settings: Settings) -> None:

@@ -157,7 +157,7 @@ def _set_times_of_recordings(folder: Path, manifest: BackupManifest) -> None:
         file = Path(find_path_in_home(path, folder))
         if file.is_relative_to(folder):
             size, time = map(int, stamp.split())
-            known = manifest.files[file.relative_to(folder).as_posix()]
+            known = manifest.files.get(file.relative_to(folder).as_posix())
             if known == {"bytes": size, "sha256": sha256}:
                 os.utime(file, ns=(time, time))
 

@@ -120,7 +120,7 @@ class VerifyReport:
         if self.equal < self.groups:
             why = ""
             if self.largest_m or self.largest_px:
-                why = f", figures by at most {self.largest_m:.3g} m and {self.largest_px:.3g} px"
+                why = f", numbers that both have by at most {self.largest_m:.3g} m and {self.largest_px:.3g} px"
             if other_solver:
                 why += (
                     f"; the version was computed by solver {self.solver_version}, "
@@ -471,8 +471,13 @@ def _find_solution_differences(
         # Their keys follow from the version of the solver, too.
         views = decode_frozen_json(task.frozen[row.solution or ""])["views"]
         for at, (view, key) in enumerate(zip(views, encoded.calibration_keys, strict=True)):
-            then = task.frozen[CALIBRATION + view["calibration_key"]]
-            pairs.append((f"views.{at}.calibration.", then, encoded.calibrations[key]))
+            place = f"views.{at}.calibration"
+            then = task.frozen.get(f"{CALIBRATION}{view['calibration_key']}")
+            now = encoded.calibrations.get(key)
+            if then is not None and now is not None:
+                pairs.append((f"{place}.", then, now))
+            elif then is not now:
+                yield VerifyDifference(row.key, place, then and "frozen", now and "computed")
     else:
         for key, body in sorted(encoded.calibrations.items()):
             frozen = task.frozen.get(CALIBRATION + key)

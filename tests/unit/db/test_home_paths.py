@@ -52,3 +52,15 @@ def test_beside_the_former_home_this_one_has_its_own_uploads_and_frames(
 )
 def test_other_paths_stay(home: Path, path: str) -> None:
     assert find_path_in_home(path, home) == path
+
+
+def test_a_lost_upload_is_never_another_file_of_a_similar_name(home: Path) -> None:
+    (home / "sample").mkdir(parents=True, exist_ok=True)
+    (home / "sample" / "a.png").write_bytes(b"another")
+    lost = f"/former/uploads/{'0' * 32}/sample/a.png"
+    assert find_path_in_home(lost, home) == lost
+
+
+def test_no_path_leads_out_of_the_home(home: Path) -> None:
+    path = f"/former/uploads/{'0' * 32}/../../sample/a.png"
+    assert find_path_in_home(path, home) == path

@@ -110,7 +110,7 @@ class TestVerify:
         report.solver_version_now = "99"
         assert {item.place for item in report.differences} == {"ball.point.0", "ball"}
         assert report.sentence.startswith(
-            "1 of 4 groups came out differently, figures by at most 0.25 m and 0 px; the version"
+            "1 of 4 groups came out differently, numbers that both have by at most 0.25 m and 0 px; the version"
         )
 
     def test_a_group_that_breaks_does_not_hide_the_others(
