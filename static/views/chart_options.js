@@ -88,8 +88,12 @@ function rangeX(asked, low, high) {
 /** The ends of values with their intervals, of which so much is seen as the values span. @param {Curve[]} curves @param {number} low @param {number} high @returns {[number, number]} */
 export function withIntervals(curves, low, high) {
 	const most = high > low ? high - low : Math.max(1, Math.abs(high) * 0.1);
-	const ends = curves.flatMap((curve) => (curve.low && curve.high ? [...curve.low, ...curve.high] : [])).filter((value) => typeof value === 'number');
-	const [least, largest] = [Math.min(low, ...ends), Math.max(high, ...ends)];
+	let [least, largest] = [low, high];
+	for (const { low: from, high: to } of curves) {
+		if (!from || !to) continue;
+		for (const value of from) if (typeof value === 'number' && value < least) least = value;
+		for (const value of to) if (typeof value === 'number' && value > largest) largest = value;
+	}
 	return [Math.max(least, low - most), Math.min(largest, high + most)];
 }
 

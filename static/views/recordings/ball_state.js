@@ -95,6 +95,7 @@ export function useBalls(one, shot) {
 		stand();
 		// A picture that is behind what is wanted is the one that was clicked.
 		if (where !== frame) goTo(where);
+		if (shot && (where < shot.first || where > shot.last)) { explain('This frame is of another shot: click the ball again.'); return; }
 		const said = { frame: where, x: at.x, y: at.y };
 		setCross(null);
 		const there = runAt(runs, where);

@@ -48,6 +48,8 @@ import { useEnded } from '../running_jobs.js';
  */
 
 const NO_CAMERAS = 'This shot has no cameras yet.';
+/** Shots that one press asks for: a person may have 24 jobs that wait, and needs some for other work. */
+const TOGETHER = 12;
 
 /** Whether two share a frame. @param {JobSubject | {first: number, last: number} | null} a a job may say neither: it works on all @param {{first: number, last: number}} b */
 const overlaps = (a, b) => (a?.first ?? 0) <= b.last && b.first <= (a?.last ?? Infinity);
@@ -89,8 +91,14 @@ export function useCameras(one, shots, shot, { jobs, watch }) {
 	}
 	function trackAll() {
 		if (asking) return;
-		const jobs = missing.map(async (shot) => { watch(await postCameras(one.id, shot)); });
-		attempt(Promise.all(jobs), () => announce(`${plural(missing.length, 'shot')} will be tracked, one after the other.`));
+		const some = missing.slice(0, TOGETHER);
+		const rest = missing.length - some.length;
+		const begin = async () => {
+			for (const shot of some) watch(await postCameras(one.id, shot));
+		};
+		attempt(begin(), () => (rest
+			? inform(`${some.length} of ${missing.length} shots will be tracked, one after the other. Press the button again when they are done.`)
+			: announce(`${plural(some.length, 'shot')} will be tracked, one after the other.`)));
 	}
 	function turnHalf() {
 		if (isBusy()) return;
@@ -114,6 +122,8 @@ export function useCameras(one, shots, shot, { jobs, watch }) {
 	}
 	function correct() {
 		if (isBusy()) return;
+		// Behind shots that are tracked it takes long, and the person does something else meanwhile.
+		const waits = tracking.some((one) => !isOver(one));
 		attempt(postInstants(one.id, [frame], { propose: false, linked: false }), async (begun) => {
 			setDrawing(begun.id);
 			const over = await watch(begun);
@@ -122,7 +132,7 @@ export function useCameras(one, shots, shot, { jobs, watch }) {
 			const place = { frame: String(frame) };
 			const open = () => navigate(address(`/review/${over.result.group}/calibration`, { recording: String(one.id), ...place }));
 			const there = page.peek();
-			if (there.page !== 'recording' || there.recording !== one.id) {
+			if (waits || there.page !== 'recording' || there.recording !== one.id) {
 				inform(`A group was made of frame ${frame} of ${one.name}.`, { label: 'Draw its lines', run: open });
 				return;
 			}
