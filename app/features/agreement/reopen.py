@@ -26,6 +26,7 @@ from app.features.groups.view_paint import PaintUpdater
 from app.features.independent_annotations.adopt import ADOPTED
 from app.features.independent_annotations.service import read_annotation
 from app.features.independent_annotations.submission_queries import KIND as TAKE
+from app.soccer.actors import person_of_actor
 
 
 def undo_edit_or_decision(
@@ -65,10 +66,13 @@ def _reopen_undone_decision(session: Session, group_id: int, *, actor: str) -> N
 
 
 def _is_edit_of_adoption(session: Session, group_id: int, edit: int, take_id: int) -> bool:
-    """Whether an edit is that with which an annotation was taken over: its entry follows, behind that
-    of the annotation's verdict."""
+    """Whether an edit is that with which an annotation was taken over: by the annotation's person, and followed by
+    its entry, behind that of the annotation's verdict."""
+    annotation = read_annotation(session, take_id)
+    if person_of_actor(read_entry(session, edit).actor) != person_of_actor(annotation.person):
+        return False
     steps = list_group_entry_kinds(session, [group_id], ["edit", "verdict", TAKE])
-    judged = ["verdict"] if read_annotation(session, take_id).verdict is not None else []
+    judged = ["verdict"] if annotation.verdict is not None else []
     after = [row for row in steps if row.id > edit][: len(judged) + 1]
     if [row.kind for row in after] != [*judged, TAKE]:
         return False
