@@ -125,9 +125,9 @@ def shows_another_scene(old: Group, new: Group) -> bool:
 
 
 def _list_annotations(view: View) -> list[object]:
-    """What tells one picture of a camera from another: of a static camera the balls alone."""
+    """What tells one picture of a camera from another: of a static camera the balls alone. Many pictures show none."""
     own = [] if view.station.shared else [view.station.lines, view.station.given]
-    return [view.balls, *own]
+    return [[ball for ball in view.balls if ball.center is not None], *own]
 
 
 def _is_same_picture(old: View, new: View) -> bool | None:

@@ -335,14 +335,6 @@ def import_group_chunk(
             " imported into it",
             hint="Import into the dataset that the annotated groups come from.",
         )
-    shared = SharedStations(
-        session, origin.dataset_id, origin.source, origin.actor, lines_left=origin.lines_left
-    )
-    for group in batch:
-        shared.insert_or_update(view.station for view in group.views)
-    report.changed += len(set(shared.changed) - stations)
-    report.findings += len(set(shared.kept) - stations)
-    stations.update(shared.changed)
     keys = [group.key for group in batch]
     known = {item.key: item for item in list_known_groups(session, origin.dataset_id, keys)}
     gone = filter_groups_with_finding(session, [item.id for item in known.values()], GONE)
@@ -357,7 +349,33 @@ def import_group_chunk(
         else:
             changed.append((there.id, group, digest))
     before = _find_sources(session, [identity for identity, _, _ in changed])
+    # Decided before cameras that groups share are updated: those of another group are not theirs.
+    others = {
+        identity
+        for identity, group, digest in changed
+        if _is_another_group(session, origin, identity, group, digest, before.get(identity))
+    }
+    others_keys = {group.key for identity, group, _ in changed if identity in others}
+    shared = SharedStations(
+        session, origin.dataset_id, origin.source, origin.actor, lines_left=origin.lines_left
+    )
+    for group in batch:
+        if group.key not in others_keys:
+            shared.insert_or_update(view.station for view in group.views)
+    report.changed += len(set(shared.changed) - stations)
+    report.findings += len(set(shared.kept) - stations)
+    stations.update(shared.changed)
     for identity, group, digest in changed:
+        if identity in others:
+            report.left_out.add_problem_at(
+                origin.source,
+                group.key,
+                None,
+                f"is also the name of another group, which came from {before[identity]}; this one is left out: "
+                "import it into another dataset, or give its pictures other names; if it is the same scene, "
+                f"import it under the name {before[identity]}",
+            )
+            continue
         _update_group(
             session, origin, identity, group, digest, shared.ids, report, before.get(identity)
         )
@@ -402,6 +420,20 @@ def insert_new_groups(
     return ids
 
 
+def _is_another_group(
+    session: Session,
+    origin: ImportContext,
+    group_id: int,
+    incoming: Group,
+    digest: str,
+    before: str | None,
+) -> bool:
+    if before in (None, origin.source):
+        return False
+    stored = read_groups(session, [group_id])[group_id]
+    return stored.source_hash != digest and shows_another_scene(stored.group, incoming)
+
+
 def _update_group(
     session: Session,
     origin: ImportContext,
@@ -414,15 +446,6 @@ def _update_group(
 ) -> None:
     stored, at = read_groups(session, [group_id])[group_id], now()
     is_replaced = before not in (None, origin.source) and stored.source_hash != digest
-    if is_replaced and shows_another_scene(stored.group, incoming):
-        report.left_out.add_problem_at(
-            origin.source,
-            incoming.key,
-            None,
-            f"is also the name of another group, which came from {before}; this one is left out: "
-            "import it into another dataset, or give its pictures other names",
-        )
-        return
     followed = update_group_from_dataset(stored, incoming)
     if (count := len(followed.group.views)) > MAX_VIEWS:
         report.left_out.add_problem_at(

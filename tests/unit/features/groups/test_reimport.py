@@ -172,6 +172,33 @@ class TestOtherSources:
             )
         assert first_group(store).group == before
 
+    def test_cameras_of_a_group_that_is_left_out_are_not_those_of_the_other(
+        self, store: Store, tmp_path: Path, make_static: Callable[..., Group]
+    ) -> None:
+        def of_source(name: str, metres: float, colour: tuple[int, int, int]) -> Group:
+            group = make_static(10, (5.0 + metres, 2.0, -0.5))
+            views = []
+            for view in group.views:
+                path = tmp_path / name / f"{view.key}.jpg"
+                path.parent.mkdir(exist_ok=True)
+                path.write_bytes(picture(colour))
+                given = view.station.given
+                assert given is not None
+                moved = replace(given, position=given.position + metres)
+                station = replace(view.station, given=moved)
+                views.append(replace(view, media=Media(str(path)), station=station))
+            return replace(group, views=tuple(views))
+
+        first, second = of_source("a", 0.0, (200, 0, 0)), of_source("b", 5.0, (0, 0, 200))
+        import_groups(store, "cup", [first], source="a.zip", actor="x")
+        accept(store)
+        before = first_group(store)
+        report = import_groups(store, "cup", [second], source="b.zip", actor="x")
+        assert (report.changed, len(report.left_out.problems)) == (0, 1)
+        after = first_group(store)
+        assert after.group == before.group
+        assert not after.verdict.stale
+
     @pytest.mark.parametrize("what", ["split", "match"])
     def test_of_the_same_source_what_a_person_edited_stays_what_it_was(
         self, store: Store, tmp_path: Path, what: str
