@@ -170,8 +170,8 @@ class FrameNameIndex:
 
     A name that does not tell the match means a frame only where no folder before it could be
     another match: ``7_1.png`` and ``labels/test/7_1.txt``, but not ``epl/Arsenal/7_1.png``. Where
-    frames have no match and the names of their views tell them apart, folders say nothing. The path
-    by which a picture is read is always its name.
+    frames have no match and the names of their views tell them apart, only a folder that is called
+    like a match counts. The path by which a picture is read is always its name.
     """
 
     frames: Mapping[int, NamedFrame]
@@ -244,6 +244,15 @@ class FrameNameIndex:
         identity = self._find_frame_id(name)
         return self.frames[identity] if identity is not None and identity != _SEVERAL else None
 
+    def list_passed_folders(self, name: str) -> list[str]:
+        """The folders of a name that ``find`` passes over, or all of them where it is a path of a picture."""
+        return self._find_with_passed_folders(name)[1]
+
+    def list_folders_without_meaning(self, name: str) -> tuple[str, ...]:
+        """Those that may be a match or a group, in a dataset in which folders tell nothing."""
+        passed = [] if self._folders_tell else self.list_passed_folders(name)
+        return tuple(self._holders.find_other_folders(passed))
+
     def find_by_number(self, text: str) -> NamedFrame | None:
         """The one frame whose view or picture has a number for its name, ``4`` for ``0004.jpg``."""
         number = _parse_number(text)
@@ -297,32 +306,36 @@ class FrameNameIndex:
         return ()
 
     def _find_frame_id(self, name: str) -> int | None:
+        return self._find_with_passed_folders(name)[0]
+
+    def _find_with_passed_folders(self, name: str) -> tuple[int | None, list[str]]:
         if name.startswith("file://"):
             name = unquote(name.removeprefix("file://"))
         stem = _strip_suffix(name)
-        if stem in self._paths:
-            return self._paths[stem]
-        found = self._find_by_end_of_path(stem)
         folder, slash, last = stem.rpartition("/")
-        if found is None and slash and _DIGITS.fullmatch(last):
+        if stem in self._paths:
+            return self._paths[stem], folder.split("/")
+        found = self._find_by_end_of_path(stem)
+        if found[0] is None and slash and _DIGITS.fullmatch(last):
             # Files of a static camera are called by their frames, ``cam3/000358.jpg``.
             return self._find_by_end_of_path(f"{folder}/{int(last)}")
         return found
 
-    def _find_by_end_of_path(self, stem: str) -> int | None:
+    def _find_by_end_of_path(self, stem: str) -> tuple[int | None, list[str]]:
         parts = stem.split("/")
         for start in range(len(parts)):
             known = "/".join(parts[start:])
+            passed = parts[:start]
             # 7_1 of a match that the dataset does not have is not the 7_1 that it has.
             if (
-                not self._folders_tell
-                or known in self._telling
-                or not self._holders.find_other_folders(parts[:start])
+                known in self._telling
+                or (not self._folders_tell and not any(_MATCH in part for part in passed))
+                or not self._holders.find_other_folders(passed)
             ):
                 found = self._index.get(known)
                 if found is not None:
-                    return found
-        return None
+                    return found, passed
+        return None, []
 
 
 def _folders_tell_frames_apart(frames: Sequence[NamedFrame]) -> bool:
@@ -366,7 +379,8 @@ def _distinguishing_names(frame: NamedFrame) -> set[str]:
         names = within if frame.station else set()
     if not frame.station:
         names.add(f"{group}/{view}")
-        if not match and "/" in view:
+        # Folders that may hold files of any match, as img1, do not tell it.
+        if not match and HolderFolders().find_other_folders(view.split("/")[:-1]):
             names.add(view)
     return _add_separator_variants(names) | {name for name in _exported_names(frame) if name}
 

@@ -457,12 +457,10 @@ def _read_yolo(tree: FileTree, path: Path, run: PredictionCollector) -> None:
                 shown, None, None, "is a comma-separated table (MOT): choose the format csv"
             )
         boxes = [(number, line.split()) for number, line in enumerate(lines, 1) if line.strip()]
-        frame = run.names.find(name)
+        frame = run.find_frame(name)
         if frame is None:
             run.found.unknown[name] += len(boxes)
             run.found.reasons[name] = run.names.explain_unknown_name(name)
-        else:
-            run.matched = True
         rows.extend((shown, number, frame, cells) for number, cells in boxes)
     tracked = _has_track_ids([cells for _, _, _, cells in rows])
     if tracked:

@@ -106,16 +106,24 @@ class PredictionCollector:
         self.labels: dict[int | str, str] = {}
         self.left_out = 0
         self.matched = False
+        self._folders: dict[int, dict[tuple[str, ...], str]] = {}
         self._total = 0
         self._near_corner = 0
 
     def find_frame_or_count_unknown(self, name: str) -> NamedFrame | None:
         """The frame of a name; a name that is none is counted."""
-        found = self.names.find(name)
+        found = self.find_frame(name)
         if found is None:
             self.count_unknown_frame(name, self.names.explain_unknown_name(name))
-        else:
+        return found
+
+    def find_frame(self, name: str) -> NamedFrame | None:
+        """The frame of a name, whose folders are kept for ``validate_predictions``."""
+        found = self.names.find(name)
+        if found is not None:
             self.matched = True
+            if folders := self.names.list_folders_without_meaning(name):
+                self._folders.setdefault(found.id, {}).setdefault(folders, name)
         return found
 
     def find_frame_by_number_or_count_unknown(self, text: str) -> NamedFrame | None:
@@ -186,7 +194,10 @@ class PredictionCollector:
         found.append(Detection(box, 1.0 if score is None else score))
 
     def validate_predictions(self, path: Path) -> None:
-        """Refuse a file that says nothing, or whose ball cannot be told from other classes."""
+        """Refuse a file that says nothing, or whose ball cannot be told from other classes.
+
+        Boxes of a frame that names with different folders mean become unknown.
+        """
         report = self.found.report
         unlabelled = [name for name in self.categories if name not in self.labels]
         if self.category is None and len(self.categories) > 1 and unlabelled:
@@ -215,6 +226,11 @@ class PredictionCollector:
             )
         if not self.found.detections and not self.found.unknown and report.problems:
             raise report.problems[0]
+        for identity, names in self._folders.items():
+            if len(names) > 1 and (boxes := self.found.detections.pop(identity, ())):
+                name = ", ".join([*names.values()][:4])
+                self.found.unknown[name] += len(boxes)
+                self.found.reasons[name] = "several sequences mean this frame of the dataset"
         report.imported = self.found.boxes
         if self.left_out:
             report.counts["other classes"] = self.left_out

@@ -137,6 +137,11 @@ class TestFind:
         frames = [NamedFrame(n, f"000{n}.jpg", f"000{n}.jpg", "", SIZE) for n in (4, 5)]
         assert FrameNameIndex.of(frames).find(name).id == 4
 
+    def test_a_folder_called_like_a_match_is_not_passed_over(self) -> None:
+        frames = [NamedFrame(n, f"000{n}.jpg", f"000{n}.jpg", "", SIZE) for n in (4, 5)]
+        index = FrameNameIndex.of(frames)
+        assert index.find("2015-02-21 - 18-00 Chelsea 1 - 1 Burnley/0004.jpg") is None
+
     def test_folders_tell_groups_apart_whose_views_are_called_alike(self) -> None:
         frames = [
             NamedFrame(n, f"kick-{n}", view, "", SIZE)
@@ -152,6 +157,12 @@ class TestFind:
         index = FrameNameIndex.of(frames)
         assert index.find("/home/me/task_2/0.png").id == 2
         assert index.find("/home/me/task_3/0.png") is None
+
+    def test_a_folder_of_a_view_that_holds_files_of_any_match_does_not_tell_it(self) -> None:
+        view = "img1/000001.jpg"
+        index = FrameNameIndex.of([NamedFrame(1, view, view, "", SIZE)])
+        assert index.find(view).id == 1
+        assert index.find("SNMOT-061/img1/000001.jpg") is None
 
     def test_the_path_of_its_picture_is_a_name_of_every_frame(self) -> None:
         frames = [
