@@ -34,6 +34,8 @@ from app.formats.csv_text import is_missing, parse_number_list, read_rows
 from app.formats.fields import id_to_text
 from app.formats.file_tree import FileTree, ImportLimits
 from app.formats.report import ReaderReport
+from app.formats.safe_path import read_regular_file
+from app.formats.trees import FolderTree
 from app.json_text import quote_text
 from app.soccer.choices import BallEventKind
 from app.soccer.frames import Box, ImageSize
@@ -156,10 +158,10 @@ def _read_mot_tracks(
     tree: FileTree, name: str, content: bytes, run: PredictionCollector
 ) -> _MotTracks:
     folder = _find_sequence_folder(name)
-    ini = f"{folder}/{_GAME}" if folder else _GAME
-    text = tree.read_bytes(ini).decode("utf-8", "replace") if ini in tree.names() else ""
-    labels = {int(number): label.strip() for number, label in _TRACKLET.findall(text)}
-    if labels or not _has_several_tracks(content):
+    labels = {
+        int(number): label.strip() for number, label in _TRACKLET.findall(_read_game(tree, name))
+    }
+    if labels or (run.category is None and not _has_several_tracks(content)):
         return _MotTracks(folder, labels or None)
     if run.category is None:
         raise InputError(
@@ -169,6 +171,21 @@ def _read_mot_tracks(
             pointer="/category",
         )
     return _MotTracks(folder, labels)
+
+
+def _read_game(tree: FileTree, name: str) -> str:
+    """The text of the gameinfo.ini in the folder of a table of MOT or of its sequence; or empty."""
+    for folder in (_find_sequence_folder(name), str(PurePosixPath(name).parent)):
+        ini = f"{folder}/{_GAME}" if folder not in ("", ".") else _GAME
+        if ini in tree.names():
+            return tree.read_bytes(ini).decode("utf-8", "replace")
+    # A file alone, and a folder gt, have it outside.
+    outside = (tree.path / name).parent if isinstance(tree, FolderTree) else None
+    while outside is not None:
+        if (outside / _GAME).is_file():
+            return read_regular_file(outside / _GAME).decode("utf-8", "replace")
+        outside = outside.parent if outside.name.lower() in _MOT_FOLDERS else None
+    return ""
 
 
 def _has_several_tracks(content: bytes) -> bool:
@@ -251,7 +268,9 @@ def _add_row(
     score = read_field(cells, score_name, fields.parse_number) if score_name else None
     if not _is_ball_row(run, cells, tracks):
         return
-    frame = None if tracks is None else _find_sequence_frame(run, tracks.folder, cells["frame"])
+    frame = None
+    if tracks is not None:
+        frame = _find_sequence_frame(run, tracks.folder, cells["frame"], alone)
     if tracks is None or (frame is None and alone):
         frame = _find_row_frame(run, cells)
     elif frame is None:
@@ -268,14 +287,21 @@ def _add_row(
             run.add_detection(frame, box, score, size)
 
 
-def _find_sequence_frame(run: PredictionCollector, folder: str, number: str) -> NamedFrame | None:
-    """The frame of a number in the folder of a sequence, or in the match that is called like it."""
-    picture = number.strip().zfill(6)
+def _find_sequence_frame(
+    run: PredictionCollector, folder: str, number: str, alone: bool
+) -> NamedFrame | None:
+    """The frame of a number in the folder of a sequence, or in the match that is called like it.
+
+    Where the sequence is not alone, its name has to be part of that of the frame.
+    """
     for place in (folder, folder.rsplit("/", 1)[-1]) if folder else ():
-        for name in (f"{place}/img1/{picture}", f"{place}/{picture}"):
-            if (found := run.names.find(name)) is not None:
-                run.matched = True
-                return found
+        depth = len(place.split("/"))
+        for picture in dict.fromkeys(number.strip().zfill(digits) for digits in (6, 0, 3, 4, 5, 8)):
+            for name in (f"{place}/img1/{picture}", f"{place}/{picture}"):
+                if not alone and len(run.names.list_passed_folders(name)) >= depth:
+                    continue
+                if (found := run.find_frame(name)) is not None:
+                    return found
     return None
 
 

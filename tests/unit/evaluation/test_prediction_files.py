@@ -506,6 +506,55 @@ class TestCsv:
         found = read_predictions(path, "auto", names, category=2)
         assert [item.box.x for item in found.detections[1]] == [30]
 
+    @pytest.mark.parametrize("place", ["gameinfo.ini", "gt/gameinfo.ini"])
+    @pytest.mark.parametrize("given", ["", "gt", "gt/gt.txt"])
+    def test_the_game_of_mot_lies_beside_the_table_or_its_folder(
+        self, tmp_path: Path, names, place: str, given: str
+    ) -> None:
+        rows = "7,1,10,20,8,9,0.5,-1,-1,-1\n7,2,30,20,8,9,0.5,-1,-1,-1\n"
+        write(tmp_path / "gt/gt.txt", rows)
+        write(tmp_path / place, "trackletID_1= player\ntrackletID_2= ball;1\n")
+        found = read_predictions(tmp_path / given, "auto", names)
+        assert [item.box.x for item in found.detections[1]] == [30]
+
+    def test_a_track_of_mot_is_the_ball_also_where_frames_have_one_track(
+        self, tmp_path: Path
+    ) -> None:
+        frames = [NamedFrame(n, f"S-{n}/1.jpg", "0001.jpg", f"S-{n}", SIZE) for n in (1, 2)]
+        write(tmp_path / "S-1/gt/gt.txt", "1,1,10,20,8,9,1,-1\n1,7,100,20,8,9,1,-1\n")
+        write(tmp_path / "S-2/gt/gt.txt", "1,7,200,20,8,9,1,-1\n")
+        found = read_predictions(tmp_path, "auto", FrameNameIndex.of(frames), category=7)
+        assert [found.detections[n][0].box.x for n in (1, 2)] == [100, 200]
+
+    def test_sequences_of_mot_that_the_dataset_does_not_tell_apart_are_unknown(
+        self, tmp_path: Path
+    ) -> None:
+        frames = [NamedFrame(n, f"{n:06}.jpg", f"{n:06}.jpg", "", SIZE) for n in (1, 2)]
+        index = FrameNameIndex.of(frames)
+        for n in (1, 2):
+            write(tmp_path / f"S-{n}/det/det.txt", f"{n},-1,{n}00,20,8,9,0.9,-1\n")
+        found = read_predictions(tmp_path, "auto", index)
+        assert (found.boxes, found.unknown.total()) == (0, 2)
+        assert read_predictions(tmp_path / "S-2", "auto", index).boxes == 1
+
+    def test_frames_that_several_folders_mean_are_unknown(self, tmp_path: Path) -> None:
+        frames = [
+            NamedFrame(n, f"{n}.jpg", f"{n}.jpg", "", SIZE, path=f"/d/S-1/img1/{n}.jpg")
+            for n in (1, 2)
+        ]
+        index = FrameNameIndex.of(frames)
+        rows = "".join(
+            f"{name},10,20,8,9\n"
+            for name in ("/d/S-1/img1/1.jpg", "/d/S-2/img1/1.jpg", "/d/S-1/img1/2.jpg")
+        )
+        found = read_predictions(write(tmp_path / "a.csv", f"image,x,y,w,h\n{rows}"), "auto", index)
+        assert [*found.detections] == [2]
+        assert found.unknown == {"/d/S-1/img1/1.jpg, /d/S-2/img1/1.jpg": 2}
+        assert "several sequences mean this frame" in next(iter(found.reasons.values()))
+        for n in (1, 2):
+            write(tmp_path / f"y/S-{n}/labels/1.txt", YOLO)
+        assert read_predictions(tmp_path / "y", "auto", index).boxes == 0
+
     def test_several_tables_are_named(self, tmp_path: Path, names) -> None:
         for name in ("a.csv", "b.csv"):
             write(tmp_path / name, CSV)
