@@ -184,7 +184,6 @@ _JSON: _Kinds = (
         _compile_key_patterns("shapes", "imagePath"),
         LABELME,
     ),
-    (_compile_key_patterns("imageData"), LABELME),
     (
         _compile_key_patterns("file_attributes", "regions"),
         VIA,
@@ -207,6 +206,7 @@ _JSON: _Kinds = (
     (_compile_key_patterns("images", "annotations"), FormatGuess("coco", "coco")),
     (_compile_key_patterns("images", "categories"), FormatGuess("coco", "coco")),
     (_compile_key_patterns("images", "file_name"), FormatGuess("coco", "coco")),
+    (_compile_key_patterns("imageData"), LABELME),
     (
         _compile_key_patterns("image_id", "score"),
         FormatGuess("COCO results of a detector", None, PREDICTED),
@@ -290,9 +290,10 @@ def _guess_format_of_tree(tree: FileTree) -> FormatGuess | None:
     )
     if seen:
         return seen.most_common(1)[0][0]
-    if any(_EMPTY_LABELS.search(name) for name in names):
+    if any(_EMPTY_LABELS.search(name) and _is_empty(tree, name) for name in heads[:MAX_FILES]):
         return YOLO_LABELS
-    if not heads and (packed := next(filter(_PACKED.search, names), None)) is not None:
+    shown = any(suffixes[suffix] for suffix in (*IMAGE_SUFFIXES, *VIDEO_SUFFIXES))
+    if not (heads or shown) and (packed := next(filter(_PACKED.search, names), None)) is not None:
         name = PurePosixPath(packed).name
         return FormatGuess(
             f"a packed file ({name})", None, "unpack it; of packed files only zip is read"
@@ -304,11 +305,21 @@ def _guess_format_of_tree(tree: FileTree) -> FormatGuess | None:
     return None
 
 
-def _guess_format_from_file_start(tree: FileTree, name: str) -> FormatGuess | None:
+def _is_empty(tree: FileTree, name: str) -> bool:
+    return _read_file_start(tree, name, 1) == b""
+
+
+def _read_file_start(tree: FileTree, name: str, size: int) -> bytes | None:
+    """The first bytes of a file, None where it cannot be read."""
     try:
         with tree.open(name) as file:
-            head = file.read(HEAD_BYTES)
+            return file.read(size)
     except (*BROKEN, ReviewError, ValueError):
+        return None
+
+
+def _guess_format_from_file_start(tree: FileTree, name: str) -> FormatGuess | None:
+    if (head := _read_file_start(tree, name, HEAD_BYTES)) is None:
         return None
     patterns = _HEADS[PurePosixPath(name).suffix.lower()]
     return next(

@@ -19,12 +19,14 @@ CASES: list[tuple[dict[str, Any], str]] = [
     ({"x.json": {"Side line left": [{"x": 0.1, "y": 0.2}]}}, "sn-calibration"),
     ({"x.json": {"pan_degrees": 1.0}}, "cameras"),
     ({"x.xml": "<?xml version='1.0'?><viper xmlns='x'></viper>"}, "issia"),
+    ({"x.json": {"images": [{"file_name": "a.jpg", "imageData": None}], "annotations": []}}, "coco"),
     ({"x.parquet": "PAR1"}, "parquet"),
     ({"x.csv": ",frame,x_cam1,y_cam1\n"}, "issia-3d"),
     ({"labels/a.txt": "0 0.5 0.5 0.1 0.1\n", "data.yaml": "names: [ball]"}, "YOLO labels"),
     ({"labels/a.txt": "3 0.51 0.52 0.11 0.1 0.93\n"}, "YOLO labels"),
     ({"gt/gt.txt": "1,1,10,20,30,40,1,-1,-1\n"}, "MOT"),
     ({"a.json": {"shapes": [], "imagePath": "a.jpg"}, "a.jpg": "x"}, "LabelMe"),
+    ({"a.json": {"imageData": "x"}}, "LabelMe"),
     ({"via.json": {"a.jpg1": {"regions": [], "file_attributes": {}}}}, "VIA"),
     ({"p.json": [{"data": {}, "annotations": [{"from_name": "a", "to_name": "b"}]}]},
      "Label Studio"),
@@ -54,6 +56,9 @@ CASES: list[tuple[dict[str, Any], str]] = [
       for ending in (".tar", ".tar.gz", ".json.gz", ".7z", ".rar")),
     ({"a.mp4": "x"}, "a video"),
     ({"a.jpg": "x"}, "pictures alone"),
+    ({"a.jpg": "x", "backup.rar": "x"}, "pictures alone"),
+    ({"a.mp4": "x", "old.tar.gz": "x"}, "a video"),
+    ({"images/a.jpg": "x", "labels/readme.txt": "Who drew this"}, "frames"),
 ]  # fmt: skip
 
 
@@ -66,7 +71,7 @@ class TestLooksLike:
         assert look is not None
         assert look.advice_sentence.startswith("It looks like ")
         assert name in look.advice_sentence
-        formats = {"coco", "gamestate", "issia", "issia-3d", "cameras", "parquet"}
+        formats = {"coco", "frames", "gamestate", "issia", "issia-3d", "cameras", "parquet"}
         if name in formats | {"sn-calibration", "soccernet-v3"}:
             assert (look.format, "choose that format" in look.advice_sentence) == (name, True)
         else:
