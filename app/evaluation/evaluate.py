@@ -81,8 +81,8 @@ def make_boxes_table(
         truth: The kind of box whose overlap a run keeps of each frame (``box_iou``): its row
             opens the frames.
     """
-    compared = _select_comparable_boxes(frames, reference)
     kinds = list_kinds_of_boxes(frames, reference)
+    compared = _select_comparable_boxes(frames, reference, kinds)
     rows = [
         _make_box_row(kind, label, [(frame, frame.boxes[kind], box) for frame, box in compared if kind in kinds], resamples,
              len(reference), FrameFieldRange("box_iou") if kind == truth else None)
@@ -119,7 +119,7 @@ def make_boxes_figure(
     kinds = list_kinds_of_boxes(frames, reference)
     compared = sorted(
         (distances[frame.id], frame.id, frame, box)
-        for frame, box in _select_comparable_boxes(frames, reference)
+        for frame, box in _select_comparable_boxes(frames, reference, kinds)
         if frame.id in distances
     )
     note = f"{plural(len(compared), 'frame')}; a point opens its frame."
@@ -163,9 +163,8 @@ def _make_scatter_series(
 
 
 def _select_comparable_boxes(
-    frames: Sequence[GroundTruthFrame], reference: Mapping[int, Box]
+    frames: Sequence[GroundTruthFrame], reference: Mapping[int, Box], kinds: Sequence[str]
 ) -> list[tuple[GroundTruthFrame, Box]]:
-    kinds = list_kinds_of_boxes(frames, reference)
     return [
         (frame, reference[frame.id])
         for frame in frames

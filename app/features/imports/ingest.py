@@ -351,22 +351,21 @@ def import_group_chunk(
     before = _find_sources(session, [identity for identity, _, _ in changed])
     # Decided before cameras that groups share are updated: those of another group are not theirs.
     others = {
-        identity
+        group.key
         for identity, group, digest in changed
         if _is_another_group(session, origin, identity, group, digest, before.get(identity))
     }
-    others_keys = {group.key for identity, group, _ in changed if identity in others}
     shared = SharedStations(
         session, origin.dataset_id, origin.source, origin.actor, lines_left=origin.lines_left
     )
     for group in batch:
-        if group.key not in others_keys:
+        if group.key not in others:
             shared.insert_or_update(view.station for view in group.views)
     report.changed += len(set(shared.changed) - stations)
     report.findings += len(set(shared.kept) - stations)
     stations.update(shared.changed)
     for identity, group, digest in changed:
-        if identity in others:
+        if group.key in others:
             report.left_out.add_problem_at(
                 origin.source,
                 group.key,

@@ -8,7 +8,7 @@ from typing import get_args
 from app.db.session import Session, now
 from app.db.store import Store
 from app.errors import ConflictError, InputError
-from app.features.agreement.queries import list_undecided_groups
+from app.features.agreement.queries import OPEN, read_agreement_states
 from app.features.groups.queries import StoredGroup
 from app.features.groups.state import GroupState, require_unchanged, require_unchanged_content
 from app.features.groups.submit import ensure_group_solution
@@ -149,7 +149,7 @@ def _require_decided(session: Session, stored: StoredGroup, verdict: Verdict) ->
     """Refuse a verdict that would pass over annotations that differ; withdrawing one is allowed."""
     if verdict.state == "unreviewed":
         return
-    if stored.id in list_undecided_groups(session, stored.dataset_id):
+    if read_agreement_states(session, [stored.id]).get(stored.id) == OPEN:
         raise ConflictError(
             "the independent annotations of this group differ, and nobody has decided yet",
             hint=f"Decide between them first: /adjudicate/{stored.id}",

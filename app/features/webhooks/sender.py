@@ -273,6 +273,8 @@ class WebhookSender:
         Args:
             look: Called every ``LOOK_SECONDS`` while tries are under way; what is due then is sent beside them.
         """
+        if self._seconds_until_next_due() > 0:
+            return 0
         return asyncio.run(self._send_all_due(look))
 
     async def _send_all_due(self, look: Callable[[], object] | None) -> int:

@@ -8,6 +8,7 @@ import { count, plural } from '../../lib/format.js';
 import { pitchSize, shownSize } from '../../lib/pitch_size.js';
 import { FormError } from '../form_error.js';
 import { JobProgress } from '../job_progress.js';
+import { TOGETHER } from './camera_state.js';
 
 /** @import {CameraSummary, ShotCamerasJson} from '../../api/cameras.js' */
 /** @import {RecordingJson} from '../../api/recordings.js' */
@@ -56,7 +57,7 @@ export function CameraCard({ one, cameras }) {
 				<button class="button ${stretch && !fresh.length ? '' : 'button--primary'}" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy} onClick=${cameras.track}>${stretch ? 'Track again' : 'Track this shot'} <kbd>T</kbd></button>
 				<button class="button" type="button" data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy || 'Makes a group of this frame and opens it in the calibration editor'} onClick=${cameras.correct}>Draw lines <kbd>E</kbd></button>
 				${stretch ? html`<button class="button" type="button" aria-pressed=${stretch.summary.turned} data-needs="lead" data-of=${one.dataset} aria-disabled=${busy !== ''} title=${busy || 'The painted lines look the same from both sides of the pitch. Use this for a camera that stands opposite the main camera'} onClick=${cameras.turnHalf}>Turn to the other side <kbd>Shift T</kbd></button>` : null}
-				${missing > 1 ? html`<button class="button" type="button" data-needs="lead" data-of=${one.dataset} title="Shots of the main camera and replays that have no cameras, except dropped ones; twelve at a time" onClick=${cameras.trackAll}>${missing > 12 ? `Track 12 of ${missing} shots` : `Track all ${missing} shots`} without cameras</button>` : null}
+				${missing > 1 ? html`<button class="button" type="button" data-needs="lead" data-of=${one.dataset} title=${`Shots of the main camera and replays that have no cameras, except dropped ones; ${TOGETHER} at a time`} onClick=${cameras.trackAll}>${missing > TOGETHER ? `Track ${TOGETHER} of ${missing} shots` : `Track all ${missing} shots`} without cameras</button>` : null}
 			</p>
 			${stretch ? html`
 				<p class="camera__files">Save as ${FILES.map(([format, label], index) => html`${index ? ', ' : ''}<a key=${format} class="link" href=${camerasFile(one.id, stretch.first, format)} download>${label}</a>`)}</p>` : null}

@@ -49,7 +49,7 @@ import { useEnded } from '../running_jobs.js';
 
 const NO_CAMERAS = 'This shot has no cameras yet.';
 /** Shots that one press asks for: a person may have 24 jobs that wait, and needs some for other work. */
-const TOGETHER = 12;
+export const TOGETHER = 12;
 
 /** Whether two share a frame. @param {JobSubject | {first: number, last: number} | null} a a job may say neither: it works on all @param {{first: number, last: number}} b */
 const overlaps = (a, b) => (a?.first ?? 0) <= b.last && b.first <= (a?.last ?? Infinity);
